@@ -1,0 +1,110 @@
+"""Exceptions of screwkin: every one says where, what was found, what was expected and what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+class ScrewkinError(Exception):
+    """Base of all errors raised on purpose; ``exit_code`` is what the command line returns for it."""
+
+    exit_code = 1
+
+
+class InputError(ScrewkinError, ValueError):
+    """A file, option or argument is wrong; nothing was computed and nothing was written."""
+
+    exit_code = 2
+
+
+class ShapeError(InputError):
+    """An array has the wrong shape, a wrong dtype, or holds NaN or infinity."""
+
+
+class UnknownNameError(InputError, LookupError):
+    """A name (robot, gait, link, joint, frame) does not exist; the message lists the valid ones."""
+
+    def __init__(self, what: str, name: str, valid: Sequence[str]) -> None:
+        self.what, self.name, self.valid = what, name, tuple(valid)
+        listed = ", ".join(self.valid) if self.valid else "none"
+        super().__init__(f"unknown {what} {name!r}; valid: {listed}")
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One wrong place of a file: where it stands, what was found and what would be right."""
+
+    row: str
+    key: str
+    found: str
+    fix: str
+
+    def __str__(self) -> str:
+        place = ", ".join(part for part in (self.row, f"key {self.key}" if self.key else "") if part)
+        return f"{place}: {self.found}. {self.fix}"
+
+
+class FileFaults(InputError):
+    """A file with faults; all of them are reported at once, and kept in ``faults``."""
+
+    def __init__(self, path: str, faults: Sequence[Fault]) -> None:
+        self.path, self.faults = path, tuple(faults)
+        super().__init__("\n".join(f"{path}: {fault}" for fault in self.faults))
+
+
+class TableError(FileFaults):
+    """A robot table is wrong."""
+
+
+class GaitError(FileFaults):
+    """A gait file, or a value set over it, is wrong."""
+
+
+class TrajectoryError(InputError):
+    """A trajectory file is damaged, truncated, foreign or inconsistent."""
+
+
+class OutputError(InputError, OSError):
+    """An output folder or file cannot be written."""
+
+
+class MissingDependencyError(ScrewkinError, ImportError):
+    """An optional package is absent; the message says what to install."""
+
+    exit_code = 2
+
+
+class NoSolutionError(ScrewkinError, ArithmeticError):
+    """The input is sound but the answer is no: out of reach, singular, outside the support polygon."""
+
+    exit_code = 3
+
+
+class UnreachableError(NoSolutionError):
+    """A limb cannot reach its target; ``limb``, ``sample`` and ``distance`` [m] say which and how far."""
+
+    def __init__(self, message: str, limb: str = "", sample: int = -1, distance: float = float("nan")) -> None:
+        self.limb, self.sample, self.distance = limb, sample, distance
+        super().__init__(message)
+
+
+class SingularError(NoSolutionError):
+    """A limb or mechanism is singular; ``limb`` and ``sample`` say where."""
+
+    def __init__(self, message: str, limb: str = "", sample: int = -1) -> None:
+        self.limb, self.sample = limb, sample
+        super().__init__(message)
+
+
+class LimitError(NoSolutionError):
+    """A joint position lies outside its limits."""
+
+
+class SafetyError(ScrewkinError):
+    """Refused because it could damage the robot."""
+
+    exit_code = 4
