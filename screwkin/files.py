@@ -1,0 +1,122 @@
+"""Files written beside, then renamed, so that nobody sees a half-written one; npz without pickles."""
+
+from __future__ import annotations
+
+import io
+import secrets
+import tempfile
+import tokenize
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, BinaryIO, TextIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from screwkin.errors import InputError, OutputError, ScrewkinError
+
+_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest a zip can tell; a true one would change the bytes
+_DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, KeyError, tokenize.TokenError)
+
+
+def _because(error: OSError) -> str:
+    return error.strerror or str(error)
+
+
+def make_folder(path: str | Path) -> Path:
+    """The folder, created with its parents where absent.
+
+    Raises:
+        OutputError: it cannot be created, is a file, or cannot be written to.
+    """
+    folder = Path(path)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise OutputError(
+            f"cannot write to folder {folder}: {_because(error)}. Name another folder."
+        ) from None
+    return folder
+
+
+@contextmanager
+def atomic_path(path: str | Path) -> Iterator[Path]:
+    """An empty file beside ``path``, renamed to it when the block ends well, and removed when it does not.
+
+    For writers that want a path; its suffix is that of ``path``.
+
+    Raises:
+        OutputError: the file cannot be created, written or renamed.
+    """
+    target = Path(path)
+    beside = target.with_name(f".{target.stem}-{secrets.token_hex(4)}{target.suffix}")
+    made = False
+    try:
+        beside.touch(exist_ok=False)
+        made = True
+        yield beside
+        beside.replace(target)
+        made = False
+    except OSError as error:
+        if isinstance(error, ScrewkinError):
+            raise
+        raise OutputError(f"cannot write {target}: {_because(error)}") from None
+    finally:
+        if made:
+            beside.unlink(missing_ok=True)
+
+
+@contextmanager
+def atomic_write(path: str | Path) -> Iterator[TextIO]:
+    """A text file (UTF-8, line feeds) that appears under its name only when completely written."""
+    with atomic_path(path) as beside, beside.open("w", encoding="utf-8", newline="\n") as file:
+        yield file
+
+
+@contextmanager
+def atomic_write_bytes(path: str | Path) -> Iterator[BinaryIO]:
+    """A binary file that appears under its name only when completely written."""
+    with atomic_path(path) as beside, beside.open("wb") as file:
+        yield file
+
+
+def npz_bytes(arrays: Mapping[str, NDArray[Any]]) -> bytes:
+    """An npz file whose bytes depend on the arrays alone.
+
+    Stored, not deflated: compressors differ between versions.
+    """
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:
+        for name, array in arrays.items():
+            member = io.BytesIO()
+            np.lib.format.write_array(member, np.asarray(array, order="C"), allow_pickle=False)
+            archive.writestr(zipfile.ZipInfo(f"{name}.npy", _DATE), member.getvalue())
+    return buffer.getvalue()
+
+
+def read_npz(data: bytes) -> dict[str, NDArray[Any]]:
+    """The arrays of an npz file; pickled objects are refused.
+
+    Raises:
+        InputError: not an npz file, truncated, damaged, or holding pickles.
+    """
+    if not (data.startswith(b"PK") and zipfile.is_zipfile(io.BytesIO(data))):
+        raise InputError("not an npz file, or a truncated one; make it again")
+    try:
+        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
+            arrays = {name: archive[name] for name in archive.files}
+    except (ValueError, SyntaxError) as error:
+        pickled = "allow_pickle" in str(error)
+        found = "it holds pickled objects, which are never read" if pickled else f"damaged: {error}"
+        raise InputError(f"not a plain npz file; {found}") from None
+    except (*_DAMAGE, OSError, MemoryError, RuntimeError, TypeError) as error:
+        raise InputError(f"a damaged npz file; make it again ({error})") from None
+    foreign = [name for name, array in arrays.items() if not isinstance(array, np.ndarray)]
+    if foreign:
+        raise InputError(f"it holds files that are no arrays: {', '.join(foreign)}")
+    return arrays

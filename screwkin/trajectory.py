@@ -1,0 +1,328 @@
+"""The trajectory: everything a walk prescribes and predicts, sample by sample, and its files.
+
+``.npz`` holds all of it and is what the other commands read; ``.csv`` (time, then joint columns in rad) and
+``.json`` (the shape of ROS trajectory_msgs/JointTrajectory) are for other programs. Pickles are never read or
+written. The bytes of an ``.npz`` depend on the content alone, so its SHA-256 identifies the trajectory.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from screwkin.errors import InputError, TrajectoryError
+from screwkin.files import atomic_write, atomic_write_bytes, npz_bytes, read_npz
+
+Array = NDArray[np.float64]
+
+TIP_PREFIX = "T_world_"
+_RIGID = 1e-6  # largest deviation from a rotation matrix that rounding and other writers may cause
+_SHAPES: Mapping[str, tuple[str, ...]] = {
+    "time": ("T",),
+    "q": ("T", "n"),
+    "qd": ("T", "n"),
+    "qdd": ("T", "n"),
+    "T_world_base": ("T", "4", "4"),
+    "base_twist": ("T", "6"),
+    "base_acceleration": ("T", "6"),
+    "com": ("T", "3"),
+    "zmp": ("T", "2"),
+    "margin": ("T",),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """A motion of T samples of a robot with n joints; arrays are read-only copies.
+
+    time (T,) [s], increasing; joint_names (n,); q, qd, qdd (T, n) [rad or m, per s, per s^2];
+    T_world_base (T, 4, 4); base_twist, base_acceleration (T, 6): [omega; v of the base origin] in world
+    axes and its time derivative; T_world_tip: (T, 4, 4) for every limb's tip; contact (T, feet) bool for the
+    tips named in feet; com (T, 3) [m]; zmp (T, 2) [m], predicted from the motion of all links; margin (T,)
+    [m]: distance of the ZMP inside the support polygon, negative outside; meta: JSON data about its making.
+
+    Raises:
+        TrajectoryError: a shape, dtype, name or value is wrong; all faults are named.
+    """
+
+    time: Array
+    joint_names: tuple[str, ...]
+    q: Array
+    qd: Array
+    qdd: Array
+    T_world_base: Array
+    base_twist: Array
+    base_acceleration: Array
+    T_world_tip: Mapping[str, Array]
+    contact: NDArray[np.bool_]
+    feet: tuple[str, ...]
+    com: Array
+    zmp: Array
+    margin: Array
+    meta: Mapping[str, Any] = field(default_factory=dict)
+    _file_sha256: str = field(default="", init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        faults: list[str] = []
+        for name in ("joint_names", "feet"):
+            object.__setattr__(self, name, _names(name, getattr(self, name), faults))
+        sizes = {
+            "T": len(np.atleast_1d(self.time)),
+            "n": len(self.joint_names),
+            "4": 4,
+            "6": 6,
+            "3": 3,
+            "2": 2,
+        }
+        for name, axes in _SHAPES.items():
+            shape = tuple(sizes[axis] for axis in axes)
+            object.__setattr__(self, name, _numbers(name, getattr(self, name), shape, faults))
+        tips = {
+            tip: _numbers(TIP_PREFIX + tip, pose, (sizes["T"], 4, 4), faults)
+            for tip, pose in self.T_world_tip.items()
+        }
+        object.__setattr__(self, "T_world_tip", MappingProxyType(tips))
+        shape = (sizes["T"], len(self.feet))
+        object.__setattr__(self, "contact", _flags("contact", self.contact, shape, faults))
+        object.__setattr__(self, "meta", _json_data(self.meta, faults))
+        if not faults:
+            faults += _inconsistencies(self)
+        if faults:
+            raise TrajectoryError("; ".join(faults))
+
+    @property
+    def samples(self) -> int:
+        """Number of samples T."""
+        return len(self.time)
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last sample [s]."""
+        return float(self.time[-1] - self.time[0])
+
+    @property
+    def sha256(self) -> str:
+        """SHA-256 of the ``.npz`` file it was loaded from, or would be saved as."""
+        return self._file_sha256 or hashlib.sha256(npz_bytes(_arrays(self))).hexdigest()
+
+    def sampled(self, times: Array) -> tuple[Array, Array]:
+        """Joint positions and rates at other times, (..., n) each, by cubic Hermite interpolation of q, qd.
+
+        Before the first and after the last sample the motion rests there.
+        """
+        times = np.asarray(times, dtype=float)
+        inside = np.clip(times, self.time[0], self.time[-1])
+        i = np.clip(np.searchsorted(self.time, inside, side="right") - 1, 0, self.samples - 2)
+        h = (self.time[i + 1] - self.time[i])[..., None]
+        u = (inside - self.time[i])[..., None] / h
+        q0, q1, d0, d1 = self.q[i], self.q[i + 1], h * self.qd[i], h * self.qd[i + 1]
+        rise, a, b = q1 - q0, d0, d1
+        q = q0 + u * (a + u * (3 * rise - 2 * a - b + u * (a + b - 2 * rise)))
+        qd = (a + u * (2 * (3 * rise - 2 * a - b) + 3 * u * (a + b - 2 * rise))) / h
+        return q, np.where((times == inside)[..., None], qd, 0.0)
+
+    def save(self, path: str | Path) -> Path:
+        """Write ``.npz``, ``.csv`` or ``.json``, by the suffix of the path.
+
+        Raises:
+            TrajectoryError: another suffix.
+            OutputError: the file cannot be written.
+        """
+        path = Path(path)
+        if path.suffix == ".npz":
+            with atomic_write_bytes(path) as binary:
+                binary.write(npz_bytes(_arrays(self)))
+        elif path.suffix in (".csv", ".json"):
+            with atomic_write(path) as text:
+                text.write(_csv_text(self) if path.suffix == ".csv" else _ros_text(self))
+        else:
+            raise TrajectoryError(f"{path}: unknown suffix {path.suffix!r}; use .npz, .csv or .json")
+        return path
+
+
+def load_trajectory(path: str | Path) -> Trajectory:
+    """The trajectory of an ``.npz`` file, checked.
+
+    Raises:
+        TrajectoryError: not there, truncated, foreign, incomplete, inconsistent, or holding pickles.
+    """
+    path = Path(path)
+    if path.suffix in (".csv", ".json"):
+        raise TrajectoryError(f"{path}: a {path.suffix} file holds the joints only; give the .npz beside it")
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise TrajectoryError(f"{path}: cannot be read: {error.strerror}") from None
+    try:
+        trajectory = _from_arrays(read_npz(data))
+    except InputError as error:
+        raise TrajectoryError(f"{path}: {error}") from None
+    object.__setattr__(trajectory, "_file_sha256", hashlib.sha256(data).hexdigest())
+    return trajectory
+
+
+def sha256_of(path: str | Path) -> str:
+    """SHA-256 of a file's bytes, in hexadecimal.
+
+    Raises:
+        TrajectoryError: it cannot be read.
+    """
+    try:
+        return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+    except OSError as error:
+        raise TrajectoryError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def _numbers(name: str, value: Any, shape: tuple[int, ...], faults: list[str]) -> Array:
+    """A read-only float64 copy."""
+    array = np.asarray(value)
+    if array.dtype.kind not in "fiu":
+        faults.append(f"{name} has dtype {array.dtype}, expected float64")
+    elif array.shape != shape:
+        faults.append(f"{name} has shape {array.shape}, expected {shape}")
+    elif not np.isfinite(array).all():
+        row = int(np.argwhere(~np.isfinite(array))[0][0])
+        faults.append(f"{name} holds NaN or infinity, first in sample {row}")
+    else:
+        array = np.array(array, dtype=np.float64)
+        array.flags.writeable = False
+    return array
+
+
+def _flags(name: str, value: Any, shape: tuple[int, ...], faults: list[str]) -> NDArray[np.bool_]:
+    array = np.array(value)
+    if array.dtype != np.bool_:
+        faults.append(f"{name} has dtype {array.dtype}, expected bool")
+    elif array.shape != shape:
+        faults.append(f"{name} has shape {array.shape}, expected {shape}")
+    array.flags.writeable = False
+    return array
+
+
+def _names(name: str, value: Any, faults: list[str]) -> tuple[str, ...]:
+    array = np.asarray(value)
+    if array.ndim != 1 or (array.size and array.dtype.kind != "U"):
+        faults.append(f"{name} has dtype {array.dtype} and shape {array.shape}, expected a row of names")
+        return ()
+    names = tuple(array.tolist())
+    if len(set(names)) < len(names):
+        faults.append(f"{name} repeats a name: {', '.join(names)}")
+    return names
+
+
+def _json_data(meta: Any, faults: list[str]) -> Mapping[str, Any]:
+    try:
+        data = json.loads(json.dumps(dict(meta), allow_nan=False))
+    except (TypeError, ValueError) as error:
+        faults.append(f"meta is not JSON data: {error}")
+        data = {}
+    return MappingProxyType(data)
+
+
+def _inconsistencies(trajectory: Trajectory) -> list[str]:
+    """Faults that show only between well-formed fields."""
+    faults = []
+    if trajectory.samples < 2:
+        faults.append(f"time has {trajectory.samples} samples, expected at least 2")
+    elif np.min(np.diff(trajectory.time)) <= 0:
+        row = int(np.argmax(np.diff(trajectory.time) <= 0)) + 1
+        faults.append(f"time does not increase at sample {row} ({trajectory.time[row]:g} s)")
+    unknown = [foot for foot in trajectory.feet if foot not in trajectory.T_world_tip]
+    if unknown:
+        faults.append(f"feet names {', '.join(unknown)}, without {TIP_PREFIX}{unknown[0]}")
+    if "base" in trajectory.T_world_tip:
+        faults.append("a tip is called base, the name of the waist's pose; rename the tip")
+    poses = {"base": trajectory.T_world_base, **trajectory.T_world_tip}
+    return faults + [
+        f"{TIP_PREFIX}{name} is not a rigid pose in sample {int(np.argmax(bad))}"
+        for name, pose in poses.items()
+        if (bad := _not_rigid(pose)).any()
+    ]
+
+
+def _not_rigid(pose: Array) -> NDArray[np.bool_]:
+    R = pose[:, :3, :3]
+    skewed = np.abs(R @ R.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2)) > _RIGID
+    foreign = np.abs(pose[:, 3] - np.array([0.0, 0.0, 0.0, 1.0])).max(axis=1) > _RIGID
+    return np.asarray(skewed | foreign | (np.linalg.det(R) < 0))
+
+
+def _arrays(trajectory: Trajectory) -> dict[str, NDArray[Any]]:
+    """The fields as they stand in the file."""
+    arrays: dict[str, NDArray[Any]] = {}
+    for f in fields(trajectory):
+        value = getattr(trajectory, f.name)
+        if f.name == "T_world_tip":
+            arrays |= {TIP_PREFIX + tip: pose for tip, pose in value.items()}
+        elif f.name == "meta":
+            arrays[f.name] = np.array(json.dumps(dict(value), sort_keys=True))
+        elif f.init:
+            arrays[f.name] = np.asarray(value)
+    return arrays
+
+
+def _from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Trajectory:
+    """The record of a file's fields."""
+    names = [f.name for f in fields(Trajectory) if f.init and f.name != "T_world_tip"]
+    missing = [name for name in names if name not in arrays]
+    tips = {
+        key.removeprefix(TIP_PREFIX): pose
+        for key, pose in arrays.items()
+        if key.startswith(TIP_PREFIX) and key not in names
+    }
+    foreign = [key for key in arrays if key not in names and not key.startswith(TIP_PREFIX)]
+    if missing or foreign:
+        found = [f"it lacks {', '.join(missing)}"] if missing else []
+        found += [f"it holds the unknown {', '.join(foreign)}"] if foreign else []
+        raise TrajectoryError(f"not a trajectory of screwkin: {' and '.join(found)}")
+    rest: dict[str, Any] = {name: arrays[name] for name in names}
+    meta = rest["meta"]
+    try:
+        rest["meta"] = json.loads(str(meta)) if meta.dtype.kind == "U" and meta.ndim == 0 else None
+    except ValueError:
+        rest["meta"] = None
+    if not isinstance(rest["meta"], dict):
+        raise TrajectoryError("meta is not the text of a JSON object")
+    return Trajectory(T_world_tip=tips, **rest)
+
+
+def _csv_text(trajectory: Trajectory) -> str:
+    """Time [s], then one column per joint [rad or m], with every digit that distinguishes a float."""
+    rows = [",".join(("time", *trajectory.joint_names))]
+    rows += [
+        ",".join(map(repr, (t, *q)))
+        for t, q in zip(trajectory.time.tolist(), trajectory.q.tolist(), strict=True)
+    ]
+    return "\n".join(rows) + "\n"
+
+
+def _ros_text(trajectory: Trajectory) -> str:
+    """The message trajectory_msgs/JointTrajectory, times counted from its first sample."""
+
+    def stamp(seconds: float) -> dict[str, int]:
+        whole, nano = divmod(round(seconds * 1e9), 10**9)
+        return {"sec": whole, "nanosec": nano}
+
+    columns = (a.tolist() for a in (trajectory.time, trajectory.q, trajectory.qd, trajectory.qdd))
+    start = float(trajectory.time[0])
+    points = [
+        {
+            "positions": q,
+            "velocities": qd,
+            "accelerations": qdd,
+            "effort": [],
+            "time_from_start": stamp(t - start),
+        }
+        for t, q, qd, qdd in zip(*columns, strict=True)
+    ]
+    header = {"stamp": stamp(0.0), "frame_id": ""}
+    names = list(trajectory.joint_names)
+    return json.dumps({"header": header, "joint_names": names, "points": points}) + "\n"
