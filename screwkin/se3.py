@@ -326,11 +326,12 @@ def twist_from_array(array: Any) -> Twist:
     return Twist(Vector(*c[:3]), Vector(*c[3:]))
 
 
-def as_array(value: Any) -> Any:
+def as_array(value: Any, batch: tuple[int, ...] = ()) -> Any:
     """A record, or a sequence of them, as one array with the batch in front.
 
     Vector (..., 3), Rotation (..., 3, 3), Pose (..., 4, 4), Twist (..., 6); a sequence of k items puts k
-    before these. NumPy scalars give NumPy, JAX gives JAX, symbols give an object array.
+    before these. NumPy scalars give NumPy, JAX gives JAX, symbols give an object array. ``batch`` is the
+    least batch shape, for records that hold structure only.
     """
     nested = _nested(value)
     flat = _flatten(nested)
@@ -338,11 +339,12 @@ def as_array(value: Any) -> Any:
     if any(is_jax(x) for x in flat):
         import jax.numpy as jnp
 
-        stacked = jnp.stack(jnp.broadcast_arrays(*flat), axis=-1)
+        batch = np.broadcast_shapes(batch, *(np.shape(x) for x in flat))
+        stacked = jnp.stack([jnp.broadcast_to(x, batch) for x in flat], axis=-1)
         return stacked.reshape(*stacked.shape[:-1], *shape)
     if any(is_symbolic(x) for x in flat):
         return np.array(flat, dtype=object).reshape(shape)
-    batch = np.broadcast_shapes(*(np.shape(x) for x in flat))
+    batch = np.broadcast_shapes(batch, *(np.shape(x) for x in flat))
     out = np.empty((*batch, len(flat)))
     for i, x in enumerate(flat):
         out[..., i] = x

@@ -1,0 +1,1 @@
+"""Multibody dynamics of the floating base, ground wrench and ZMP, support polygon."""

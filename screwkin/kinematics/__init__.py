@@ -1,0 +1,1 @@
+"""Positions by successive screw displacements, screw Jacobians, and the centre of mass."""

@@ -1,0 +1,1 @@
+"""Rates, positions and statuses: the algorithms that meet the formulas at arrays."""

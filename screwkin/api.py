@@ -1,0 +1,245 @@
+"""Public functions over arrays: they check, compute with the formulas, and convert.
+
+Everything takes leading batch dimensions. NumPy in gives NumPy out (float64), JAX in gives JAX out, so the
+same functions go through ``jax.jit``, ``jax.vmap`` and ``jax.grad``.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from screwkin.dynamics import newton_euler
+from screwkin.errors import ShapeError
+from screwkin.kinematics import mass as _mass
+from screwkin.kinematics import positions
+from screwkin.model.robot import Robot
+from screwkin.model.state import State
+from screwkin.scalar import is_jax
+from screwkin.screw import at, wrench_at
+from screwkin.se3 import (
+    NO_TWIST,
+    ZERO,
+    Pose,
+    Twist,
+    X,
+    Y,
+    Z,
+    as_array,
+    pose_from_array,
+    twist_from_array,
+    unstack,
+    vector_from_array,
+)
+
+Array = Any
+
+
+def checked(name: str, array: Any, *shape: int) -> Array:
+    """The array as float64 NumPy or as JAX, with its trailing shape and its values checked.
+
+    Raises:
+        ShapeError: wrong trailing shape, NaN or infinity, or a float32 JAX array.
+    """
+    if is_jax(array):
+        if array.dtype == np.float32:
+            raise ShapeError(f'{name} is a float32 JAX array; switch on jax.config.update("jax_enable_x64", True)')
+    else:
+        try:
+            array = np.asarray(array, dtype=float)
+        except (TypeError, ValueError) as error:
+            raise ShapeError(f"{name} is not an array of numbers: {error}") from None
+        if not np.isfinite(array).all():
+            raise ShapeError(f"{name} holds NaN or infinity; every number must be finite")
+    if array.shape[array.ndim - len(shape) :] != shape or array.ndim < len(shape):
+        wanted = ", ".join(["...", *map(str, shape)])
+        raise ShapeError(f"{name} has shape {tuple(array.shape)}, expected ({wanted})")
+    return array
+
+
+def _parts(robot: Robot, state: State) -> tuple[Pose, list[Any], tuple[int, ...]]:
+    """Base pose, joint scalars and batch shape of a checked state."""
+    T = checked("state.T_world_base", state.T_world_base, 4, 4)
+    q = checked("state.q", state.q, len(robot.joints))
+    try:
+        batch = np.broadcast_shapes(T.shape[:-2], q.shape[:-1])
+    except ValueError:
+        raise ShapeError(
+            f"batch of state.T_world_base {T.shape[:-2]} and of state.q {q.shape[:-1]} do not broadcast"
+        ) from None
+    return pose_from_array(T), unstack(q), batch
+
+
+def _rates(robot: Robot, name: str, values: Any) -> list[Any]:
+    return unstack(checked(name, values, len(robot.joints)))
+
+
+def _twist(name: str, value: Any) -> Twist:
+    return NO_TWIST if value is None else twist_from_array(checked(name, value, 6))
+
+
+def home(robot: Robot, posture: str = "home") -> State:
+    """A named posture of the table: base upright over the world origin, at the posture's height.
+
+    Raises:
+        UnknownNameError: the table has no such posture.
+    """
+    chosen = robot.posture(posture)
+    T = np.eye(4)
+    T[2, 3] = chosen.base_height
+    return State(T, np.array(chosen.q, dtype=float))
+
+
+def link_poses(robot: Robot, state: State) -> Array:
+    """World pose of every link, by successive screw displacements.
+
+    Args:
+        robot: L links, n joints.
+        state: T_world_base (..., 4, 4) [m]; q (..., n) [rad or m].
+
+    Returns:
+        (..., L, 4, 4), in ``robot.link_names`` order; a link's frame is its ``frame`` in the table.
+
+    Raises:
+        ShapeError: wrong shape, NaN or infinity.
+
+    Source: Bioloid paper, eq. 2-3.
+    """
+    T, q, batch = _parts(robot, state)
+    D = positions.link_displacements(robot, q)
+    return as_array([T @ (d @ link.frame) for d, link in zip(D, robot.links, strict=True)], batch)
+
+
+def frame_pose(robot: Robot, state: State, frame: str) -> Array:
+    """World pose (..., 4, 4) of ``base``, a link or a tip.
+
+    Raises:
+        UnknownNameError: no such frame; the message lists all frames.
+    """
+    T, q, batch = _parts(robot, state)
+    return as_array(T @ positions.frame_pose(robot, positions.link_displacements(robot, q), frame), batch)
+
+
+def jacobian(robot: Robot, state: State, frame: str, point: Any = None) -> Array:
+    """Screw Jacobian (..., 6, 6+n) of a frame, world axes, rows [omega; v at the point].
+
+    The first six columns multiply the base's twist **told at the same point** (they are the identity), the
+    others the joint rates; columns of joints off the frame's path are zero.
+
+    Args:
+        robot: the robot.
+        state: its configuration.
+        frame: ``base``, a link or a tip.
+        point: world point (..., 3) [m] at which twists are told; default: the frame's own origin.
+    """
+    T, q, batch = _parts(robot, state)
+    turned = Pose(T.R, ZERO)
+    D = positions.link_displacements(robot, q)
+    if point is None:
+        p = (turned @ positions.frame_pose(robot, D, frame)).p
+    else:
+        p = vector_from_array(checked("point", point, 3)) - T.p
+    columns = positions.frame_jacobian(robot, positions.joint_twists(robot, D, turned), frame)
+    basis = [Twist(e, ZERO) for e in (X, Y, Z)] + [Twist(ZERO, e) for e in (X, Y, Z)]
+    joints = [at(p, columns[i]) if i in columns else NO_TWIST for i in range(len(q))]
+    return _last_axes_swapped(as_array([*basis, *joints], batch))
+
+
+def _last_axes_swapped(array: Array) -> Array:
+    return array.swapaxes(-1, -2)
+
+
+def center_of_mass(robot: Robot, state: State) -> Array:
+    """World position (..., 3) of the centre of mass [m]."""
+    T, q, batch = _parts(robot, state)
+    return as_array(T @ _mass.center_of_mass(robot, positions.link_displacements(robot, q)), batch)
+
+
+def com_jacobian(robot: Robot, state: State) -> Array:
+    """Velocity of the CoM (..., 3, 6+n), world axes, per [base twist at the base origin; qd]."""
+    T, q, batch = _parts(robot, state)
+    turned = Pose(T.R, ZERO)
+    D = [turned @ d for d in positions.link_displacements(robot, q)]
+    twists = positions.joint_twists(robot, positions.link_displacements(robot, q), turned)
+    c = _mass.center_of_mass(robot, D)
+    spin = [at(c, Twist(e, ZERO)).v for e in (X, Y, Z)]
+    return _last_axes_swapped(as_array([*spin, X, Y, Z, *_mass.com_jacobian(robot, D, twists)], batch))
+
+
+def _bodies(robot: Robot, state: State) -> tuple[newton_euler.Bodies, tuple[int, ...]]:
+    T, q, batch = _parts(robot, state)
+    return newton_euler.Bodies.of(robot, T.R, q), batch
+
+
+def momentum(robot: Robot, state: State, qd: Any, base_twist: Any = None) -> Array:
+    """Centroidal momentum (..., 6): [angular about the CoM; linear], world axes, N m s and N s.
+
+    Args:
+        robot: the robot.
+        state: its configuration.
+        qd: joint rates (..., n).
+        base_twist: [omega; v of the base origin] in world axes (..., 6); default at rest.
+    """
+    bodies, batch = _bodies(robot, state)
+    h = newton_euler.momentum(bodies, _rates(robot, "qd", qd), _twist("base_twist", base_twist))
+    c = ZERO
+    for link, B in zip(robot.links, bodies.poses, strict=True):
+        c = c + (B @ link.com) * (link.mass / robot.mass)
+    h = wrench_at(c, h)
+    return as_array(Twist(h.m, h.f), batch)
+
+
+def mass_matrix(robot: Robot, state: State) -> Array:
+    """Mass matrix (..., 6+n, 6+n) for [base twist at the base origin, world axes; qd]."""
+    bodies, batch = _bodies(robot, state)
+    return as_array(newton_euler.mass_matrix(bodies), batch)
+
+
+def inverse_dynamics(
+    robot: Robot,
+    state: State,
+    qd: Any,
+    qdd: Any,
+    base_twist: Any = None,
+    base_acceleration: Any = None,
+    gravity: float = 9.81,
+) -> Array:
+    """Generalised force (..., 6+n): wrench [m; f] on the base about its origin (world axes), joint torques.
+
+    Args:
+        robot: the robot.
+        state: its configuration.
+        qd: joint rates (..., n).
+        qdd: joint accelerations (..., n).
+        base_twist: [omega; v of the base origin], world axes (..., 6); default zero.
+        base_acceleration: its time derivative [alpha; a]; default zero.
+        gravity: [m/s^2], along -z of the world.
+    """
+    bodies, batch = _bodies(robot, state)
+    wrench, torques = newton_euler.inverse_dynamics(
+        bodies,
+        _rates(robot, "qd", qd),
+        _rates(robot, "qdd", qdd),
+        _twist("base_twist", base_twist),
+        _twist("base_acceleration", base_acceleration),
+        gravity,
+    )
+    return as_array([*wrench.m, *wrench.f, *torques], batch)
+
+
+def ground_wrench(
+    robot: Robot, state: State, qd: Any, qdd: Any, base_twist: Any, base_acceleration: Any, gravity: float = 9.81
+) -> Array:
+    """Wrench (..., 6) that the ground must give, [m; f] about the world origin, world axes."""
+    T, q, batch = _parts(robot, state)
+    wrench = newton_euler.ground_wrench(
+        newton_euler.Bodies.of(robot, T.R, q),
+        _rates(robot, "qd", qd),
+        _rates(robot, "qdd", qdd),
+        _twist("base_twist", base_twist),
+        _twist("base_acceleration", base_acceleration),
+        gravity,
+    )
+    about = wrench_at(-T.p, wrench)
+    return as_array(Twist(about.m, about.f), batch)

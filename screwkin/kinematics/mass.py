@@ -1,0 +1,42 @@
+"""Centre of mass and its Jacobian, from the links' first moments."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from screwkin.model.robot import Robot
+from screwkin.scalar import Scalar, plus
+from screwkin.screw import at
+from screwkin.se3 import ZERO, Pose, Twist, Vector
+
+
+def first_moment(robot: Robot, displacements: Sequence[Pose]) -> Vector:
+    """Sum of mass times CoM position over the links [kg m]."""
+    total = ZERO
+    for link, D in zip(robot.links, displacements, strict=True):
+        total = total + (D @ link.com) * link.mass
+    return total
+
+
+def center_of_mass(robot: Robot, displacements: Sequence[Pose]) -> Vector:
+    """CoM of the whole robot, in the frame of ``displacements`` [m]."""
+    return first_moment(robot, displacements) * (1 / robot.mass)
+
+
+def com_jacobian(robot: Robot, displacements: Sequence[Pose], twists: Sequence[Twist]) -> list[Vector]:
+    """Velocity of the CoM per unit rate of each joint: its subtree's share of the mass, moved by its screw."""
+    mass: dict[str, Scalar] = {}
+    moment: dict[str, Vector] = {}
+    for link, D in zip(robot.links, displacements, strict=True):
+        mass[link.name] = link.mass
+        moment[link.name] = (D @ link.com) * link.mass
+    for i in reversed(robot.traversal):
+        joint = robot.joints[i]
+        mass[joint.parent] = plus(mass[joint.parent], mass[joint.child])
+        moment[joint.parent] = moment[joint.parent] + moment[joint.child]
+    columns = []
+    for joint, twist in zip(robot.joints, twists, strict=True):
+        # A subtree of mass m with first moment h moves its share by (m v + omega x h) / M.
+        spin = at(moment[joint.child], Twist(twist.omega, twist.v * mass[joint.child]))
+        columns.append(spin.v * (1 / robot.mass))
+    return columns

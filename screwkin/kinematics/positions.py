@@ -1,0 +1,72 @@
+"""Positions by successive screw displacements: no joint frames, only axes in the zero pose.
+
+Formulas over records: q is a sequence of scalars, and a scalar may be a whole batch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from screwkin.model.robot import Robot
+from screwkin.scalar import Scalar
+from screwkin.screw import Screw, carry, displacement, transport
+from screwkin.se3 import IDENTITY, Pose, Twist
+
+
+def successive_displacement(
+    screws: Sequence[Screw], thetas: Sequence[Scalar], A_c_ref: Pose = IDENTITY, A_ref_k: Pose = IDENTITY
+) -> Pose:
+    """Pose of frame k in frame c through a chain whose screws are told in a frame of free choice.
+
+    ``A_c_ref`` and ``A_ref_k`` are the zero-pose transforms from c to that reference frame and from it to k.
+
+    Source: Bioloid paper, eq. 3 (and eq. 13-14 for the leg with its reference in mid-calf).
+    """
+    A = A_c_ref
+    for screw, theta in zip(screws, thetas, strict=True):
+        A = A @ displacement(screw, theta)
+    return A @ A_ref_k
+
+
+def screws_in(frame: Pose, screws: Sequence[Screw]) -> list[Screw]:
+    """The same lines told in ``frame`` (given by its pose in their present frame)."""
+    back = frame.inverse
+    return [carry(back, screw) for screw in screws]
+
+
+def chain_jacobian(screws: Sequence[Screw], thetas: Sequence[Scalar]) -> list[Twist]:
+    """Each joint's twist at the origin, where the joints before it have carried it (eq. 5)."""
+    columns, before = [], IDENTITY
+    for screw, theta in zip(screws, thetas, strict=True):
+        columns.append(transport(before, screw.twist))
+        before = before @ displacement(screw, theta)
+    return columns
+
+
+def link_displacements(robot: Robot, q: Sequence[Scalar]) -> list[Pose]:
+    """Displacement of every link from the zero pose, in the base frame, in the order of ``robot.links``."""
+    carried = {robot.base_link: IDENTITY}
+    for i in robot.traversal:
+        joint = robot.joints[i]
+        carried[joint.child] = carried[joint.parent] @ displacement(joint.screw, q[i])
+    return [carried[name] for name in robot.link_names]
+
+
+def joint_twists(robot: Robot, displacements: Sequence[Pose], T: Pose = IDENTITY) -> list[Twist]:
+    """Every joint's normalised screw at the present positions, in the frame to which T takes base coordinates."""
+    carried = dict(zip(robot.link_names, displacements, strict=True))
+    return [transport(T @ carried[joint.parent], joint.screw.twist) for joint in robot.joints]
+
+
+def frame_pose(robot: Robot, displacements: Sequence[Pose], name: str) -> Pose:
+    """Pose of ``base``, a link or a tip in the base frame."""
+    link, home = robot.frame(name)
+    return displacements[robot.link_names.index(link)] @ home
+
+
+def frame_jacobian(robot: Robot, twists: Sequence[Twist], name: str) -> dict[int, Twist]:
+    """Twist of a frame per unit rate of each joint on its path: index of the joint to its column.
+
+    ``twists`` are those of ``joint_twists``; the columns are told where they are.
+    """
+    return {i: twists[i] for i in robot.path_to(robot.frame(name)[0])}

@@ -1,0 +1,98 @@
+"""Assur virtual chains, as data: which translations and rotations lead from the floor to a body.
+
+A chain is a tuple of couplings: translations ``px py pz`` along world axes, each at most once, then rotations
+``rx ry rz``, each at most once, about axes carried by the rotations before. 3P3R is the chain of space, PPR
+that of the plane; any other selection and order of rotations makes a chain too.
+Source: Campos et al. (2005), Bioloid paper section 2.3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from screwkin import scalar
+from screwkin.errors import InputError
+from screwkin.scalar import Scalar
+from screwkin.se3 import UNTURNED, ZERO, Pose, Rotation, Twist, Vector, X, Y, Z, cross, rotate
+
+SPATIAL = ("px", "py", "pz", "rx", "ry", "rz")
+PLANAR = ("px", "py", "rz")
+SPHERICAL = ("rx", "ry", "rz")
+NAMED = {"3P3R": SPATIAL, "PPR": PLANAR, "3R": SPHERICAL}
+
+AXES = {"x": X, "y": Y, "z": Z}
+_INDEX = {"x": 0, "y": 1, "z": 2}
+
+
+def check_chain(chain: Sequence[str]) -> tuple[str, ...]:
+    """The chain, if it is one.
+
+    Raises:
+        InputError: unknown coupling, one used twice, or a translation after a rotation.
+    """
+    chain = tuple(chain)
+    unknown = [c for c in chain if c not in SPATIAL]
+    if unknown:
+        raise InputError(f"virtual chain {chain}: unknown coupling {unknown[0]!r}; valid: {', '.join(SPATIAL)}")
+    if len(set(chain)) < len(chain):
+        raise InputError(f"virtual chain {chain}: a coupling stands twice; each may stand once")
+    kinds = [c[0] for c in chain]
+    if kinds != sorted(kinds):
+        raise InputError(f"virtual chain {chain}: translations come first; write {tuple(sorted(chain))}")
+    return chain
+
+
+def rotations(chain: Sequence[str]) -> list[str]:
+    """The axes of the chain's rotations, completed to three: x, y, z in the order in which they turn."""
+    given = [c[1] for c in chain if c[0] == "r"]
+    return given + [a for a in "xyz" if a not in given]
+
+
+def chain_pose(chain: Sequence[str], values: Sequence[Scalar]) -> Pose:
+    """Pose of the body at the end of the chain, from the chain's coordinates [m, rad]."""
+    p, R = ZERO, UNTURNED
+    for coupling, value in zip(chain, values, strict=True):
+        axis = AXES[coupling[1]]
+        if coupling[0] == "p":
+            p = p + axis * value
+        else:
+            R = R @ rotate(axis, value)
+    return Pose(R, p)
+
+
+def chain_coordinates(chain: Sequence[str], pose: Pose) -> list[Scalar]:
+    """The chain's coordinates [m, rad] at a pose: the inverse of ``chain_pose`` where the chain reaches it.
+
+    Rotations are Tait-Bryan angles, the middle one within +-90 degrees; there the chain is singular.
+    """
+    i, j, k = (_INDEX[a] for a in rotations(chain))
+    columns = (tuple(pose.R.x), tuple(pose.R.y), tuple(pose.R.z))
+
+    def entry(row: int, column: int) -> Scalar:
+        return columns[column][row]
+
+    sign = 1 if (j - i) % 3 == 1 else -1
+    first = scalar.atan2(-sign * entry(j, k), entry(k, k))
+    middle = scalar.atan2(sign * entry(i, k), scalar.sqrt(entry(i, i) ** 2 + entry(i, j) ** 2))
+    last = scalar.atan2(-sign * entry(i, j), entry(i, i))
+    angles = dict(zip(rotations(chain), (first, middle, last), strict=True))
+    place = dict(zip("xyz", pose.p, strict=True))
+    return [place[c[1]] if c[0] == "p" else angles[c[1]] for c in chain]
+
+
+def chain_twists(chain: Sequence[str], R: Rotation, p: Vector) -> list[Twist]:
+    """Normalised screws of the chain's couplings when its body has orientation R and stands at p.
+
+    World axes; p and the twists are told from the same point.
+    """
+    angles = iter(chain_coordinates([c for c in chain if c[0] == "r"], Pose(R, ZERO)))
+    turned, twists = UNTURNED, []
+    for coupling in chain:
+        axis = AXES[coupling[1]]
+        if coupling[0] == "p":
+            twists.append(Twist(ZERO, axis))
+            continue
+        s = turned @ axis
+        twists.append(Twist(s, cross(p, s)))
+        turned = turned @ rotate(axis, next(angles))
+    return twists

@@ -1,0 +1,162 @@
+"""The choice of primary (imposed) and secondary (computed) couplings: a default, and a check with advice.
+
+A choice is sound at a posture when the secondary couplings are as many as the rank of N and independent.
+Ranks are decided on columns whose velocities are divided by the robot's size, so that metres do not weigh.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from screwkin.errors import InputError, SingularError, UnknownNameError
+from screwkin.mechanism.mechanism import Mechanism, coupling_graph, virtual_chains
+from screwkin.mechanism.network import coupling_twists, network_matrix
+from screwkin.model.robot import Robot
+from screwkin.se3 import UNTURNED, Rotation
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+RANK_TOLERANCE = 1e-6
+"""Smallest singular value, relative to the largest, of length-normalised screws that counts as independent."""
+
+
+def characteristic_length(robot: Robot) -> float:
+    """Size of the robot [m]: the largest distance of a joint axis point or tip from the base, at least 1 mm."""
+    points = [j.screw.s0 for j in robot.joints] + [limb.frame.p for limb in robot.limbs]
+    return max([1e-3, *(float(np.sqrt(sum(float(c) ** 2 for c in p))) for p in points)])
+
+
+def normalised(N: Array, length: float) -> Array:
+    """N with its velocity rows divided by a length: all entries of order one, without unit."""
+    scale = np.tile([1.0, 1.0, 1.0, 1.0 / length, 1.0 / length, 1.0 / length], N.shape[-2] // 6)
+    return N * scale[:, None]
+
+
+def rank(N: Array) -> int:
+    """Numerical rank of a length-normalised matrix."""
+    if min(N.shape) == 0:
+        return 0
+    values = np.linalg.svd(N, compute_uv=False)
+    return int((values > RANK_TOLERANCE * max(values[0], 1.0)).sum())
+
+
+def independent(N: Array, order: Sequence[int]) -> list[int]:
+    """Columns, taken greedily in the given order, each of which adds a direction to those before."""
+    basis: list[Array] = []
+    chosen = []
+    for column in order:
+        v = N[:, column]
+        rest = v
+        for _ in range(2):
+            for b in basis:
+                rest = rest - b * (b @ rest)
+        if np.linalg.norm(rest) > RANK_TOLERANCE * 10 * max(np.linalg.norm(v), 1e-12):
+            basis.append(rest / np.linalg.norm(rest))
+            chosen.append(column)
+    return chosen
+
+
+def network_at(mechanism: Mechanism, q: Sequence[float], R: Rotation = UNTURNED) -> Array:
+    """Length-normalised N at one posture."""
+    N = network_matrix(mechanism, coupling_twists(mechanism, R, list(q)))
+    return normalised(N, characteristic_length(mechanism.robot))
+
+
+def preference(mechanism: Mechanism) -> list[int]:
+    """Columns in the order in which they would rather be secondary.
+
+    With virtual chains: real joints, then the rotations and the translations that monitor tips, the waist last.
+    Without: the last joint of the table first, so that the first ones drive.
+    """
+    real = [mechanism.position[name] for name in mechanism.robot.joint_names]
+    if not mechanism.chains:
+        return real[::-1]
+    tips = [chain for chain in mechanism.chains if chain.limb]
+    waist = [name for chain in mechanism.chains if not chain.limb for name in chain.names]
+    turning = [n for chain in tips for n in chain.names if n.split(".")[1][0] == "r"]
+    moving = [n for chain in tips for n in chain.names if n.split(".")[1][0] == "p"]
+    return real + [mechanism.position[name] for name in (*turning, *moving, *waist)]
+
+
+def reference_posture(robot: Robot) -> tuple[float, ...]:
+    """q at which the choice is checked: posture ``home``, else the first posture, else all zero."""
+    named = {posture.name: posture.q for posture in robot.postures}
+    return named.get("home") or (robot.postures[0].q if robot.postures else (0.0,) * len(robot.joints))
+
+
+def closed_mechanism(robot: Robot, primary: Sequence[str] | None = None) -> Mechanism:
+    """The robot as one closed mechanism, its choice of primary couplings checked at the home posture.
+
+    Args:
+        robot: a humanoid (virtual chains to the waist and the tips) or any table with closures.
+        primary: names of the couplings to impose; default: the virtual chains impose, real joints follow,
+            and where a limb has fewer than six joints the rotations of its tip's chain follow too.
+
+    Returns:
+        Mechanism with ``couplings links circuits mobility primary secondary``.
+
+    Raises:
+        UnknownNameError: a primary name is no coupling.
+        InputError: too few or too many primary couplings, with the ones to move.
+        SingularError: the right number, but dependent; says which to exchange.
+
+    Source: Davies (1981); Bioloid paper, eq. 9-11, 15.
+    """
+    chains = virtual_chains(robot)
+    graph = coupling_graph(robot, chains)
+    bare = Mechanism(robot, chains, graph, (), tuple(name for name, _, _ in graph.edges), 0)
+    N = network_at(bare, reference_posture(robot))
+    mobility = len(bare.couplings) - rank(N)
+    if primary is None:
+        columns = set(independent(N, preference(bare)))
+        primary = tuple(name for i, name in enumerate(bare.couplings) if i not in columns)
+    for name in primary:
+        if name not in bare.position:
+            raise UnknownNameError("coupling", name, bare.couplings)
+    wanted = set(primary)
+    chosen = replace(
+        bare,
+        primary=tuple(name for name in bare.couplings if name in wanted),
+        secondary=tuple(name for name in bare.couplings if name not in wanted),
+        mobility=mobility,
+    )
+    _check(chosen, N)
+    return chosen
+
+
+def _check(mechanism: Mechanism, N: Array) -> None:
+    names, needed = mechanism.couplings, len(mechanism.couplings) - mechanism.mobility
+    kept = independent(N, mechanism.secondary_columns)
+    surplus = [names[i] for i in mechanism.secondary_columns if i not in kept]
+    completed = independent(N, [*kept, *preference(mechanism)])
+    missing = [names[i] for i in completed if i not in kept]
+    have = len(mechanism.secondary)
+    if have > needed:
+        raise InputError(
+            f"{have} secondary couplings but N has rank {needed}: {have - needed} too many; "
+            f"make primary: {', '.join(surplus[: have - needed])}"
+            + (f"; and make secondary instead of {', '.join(surplus[have - needed :])}: {', '.join(missing)}"
+               if missing else "")
+        )
+    if have < needed:
+        raise InputError(
+            f"{have} secondary couplings but N has rank {needed}: {needed - have} too few, the circuits could not "
+            f"close; make secondary: {', '.join(missing[: needed - have])}"
+        )
+    if surplus:
+        raise SingularError(
+            f"the secondary couplings are dependent (rank {len(kept)} of {needed}): make primary "
+            f"{', '.join(surplus)}, whose motion the other secondary couplings already contain, and make secondary "
+            f"{', '.join(missing)}, which nothing else can follow"
+        )
+
+
+def mobility_at(mechanism: Mechanism, N: Array) -> Any:
+    """Mobility (...,) at given states: couplings less the rank of N (..., 6 circuits, couplings)."""
+    values = np.linalg.svd(normalised(N, characteristic_length(mechanism.robot)), compute_uv=False)
+    ranks = (values > RANK_TOLERANCE * np.maximum(values[..., :1], 1.0)).sum(axis=-1)
+    return len(mechanism.couplings) - ranks

@@ -1,0 +1,94 @@
+"""Coupling graph: links are vertices, couplings are directed edges; trees, circuits and cut-sets.
+
+Pure integer work. Source: Davies (1981), after Kirchhoff; Bioloid paper, section 2.4 and fig. 5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+Integers = np.ndarray[Any, np.dtype[np.int64]]
+
+
+@dataclass(frozen=True)
+class Graph:
+    """Vertices by name; edges as (name, tail, head), pointing from the carrying link to the carried one."""
+
+    vertices: tuple[str, ...]
+    edges: tuple[tuple[str, str, str], ...]
+
+
+def incidence_matrix(graph: Graph) -> Integers:
+    """(vertices, edges): -1 where an edge leaves, +1 where it arrives."""
+    row = {name: i for i, name in enumerate(graph.vertices)}
+    A = np.zeros((len(graph.vertices), len(graph.edges)), dtype=np.int64)
+    for column, (_, tail, head) in enumerate(graph.edges):
+        A[row[tail], column] -= 1
+        A[row[head], column] += 1
+    return A
+
+
+def spanning_tree(graph: Graph) -> tuple[int, ...]:
+    """Indices of the edges of a spanning tree, preferring earlier edges; the others are chords."""
+    group = {name: name for name in graph.vertices}
+
+    def root(name: str) -> str:
+        while group[name] != name:
+            name = group[name]
+        return name
+
+    tree = []
+    for i, (_, tail, head) in enumerate(graph.edges):
+        a, b = root(tail), root(head)
+        if a != b:
+            group[b] = a
+            tree.append(i)
+    return tuple(tree)
+
+
+def cut_set_matrix(graph: Graph) -> Integers:
+    """Fundamental cut-sets (vertices - components, edges): one row for each edge of the spanning tree."""
+    tree = list(spanning_tree(graph))
+    A = incidence_matrix(graph).astype(float)
+    # Rows of the tree's columns have full rank; the least-squares inverse is exact and integer.
+    Q = np.linalg.pinv(A[:, tree]) @ A
+    return np.rint(Q).astype(np.int64)
+
+
+def circuit_matrix(graph: Graph) -> Integers:
+    """Fundamental circuits (chords, edges), each told so that its first edge counts +1."""
+    tree = list(spanning_tree(graph))
+    chords = [i for i in range(len(graph.edges)) if i not in set(tree)]
+    B = np.zeros((len(chords), len(graph.edges)), dtype=np.int64)
+    if chords:
+        Q = cut_set_matrix(graph)
+        B[:, tree] = -Q[:, chords].T
+        B[np.arange(len(chords)), chords] = 1
+    for row in B:
+        row *= row[np.flatnonzero(row)[0]]
+    return B
+
+
+def components(pattern: Sequence[Sequence[bool]] | Integers) -> list[tuple[list[int], list[int]]]:
+    """Blocks (rows, columns) into which a matrix with this pattern of nonzeros falls apart.
+
+    Columns without an entry belong to no block.
+    """
+    entries = np.asarray(pattern) != 0
+    blocks: list[tuple[list[int], list[int]]] = []
+    left = set(range(entries.shape[0]))
+    while left:
+        rows, columns = {min(left)}, set[int]()
+        while True:
+            grown = set(np.flatnonzero(entries[sorted(rows)].any(axis=0)).tolist())
+            reached = set(np.flatnonzero(entries[:, sorted(grown)].any(axis=1)).tolist()) | rows
+            if reached == rows and grown == columns:
+                break
+            rows, columns = reached, grown
+        blocks.append((sorted(rows), sorted(columns)))
+        left -= rows
+    return blocks

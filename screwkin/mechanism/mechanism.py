@@ -1,0 +1,147 @@
+"""A robot as one closed mechanism: its couplings, links, circuits, and who imposes and who follows.
+
+Couplings stand in the order: ``waist.*``, then per limb its real joints and its tip's virtual chain, then
+joints of no limb. Virtual chains lead from the floor to the waist (floating base) and to every tip.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from screwkin.mechanism import graph as graphs
+from screwkin.mechanism.chains import SPATIAL, check_chain
+from screwkin.mechanism.graph import Graph, Integers
+from screwkin.model.robot import Limb, Robot
+
+FLOOR = "floor"
+WAIST = "waist"
+
+
+@dataclass(frozen=True)
+class VirtualChain:
+    """A virtual chain from the floor to a frame: its name, its couplings, and the limb whose tip it moves."""
+
+    name: str
+    couplings: tuple[str, ...]
+    limb: Limb | None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Full names of its couplings, as in ``right_foot.px``."""
+        return tuple(f"{self.name}.{c}" for c in self.couplings)
+
+
+@dataclass(frozen=True, eq=False)
+class Mechanism:
+    """A closed mechanism with a checked choice of primary (imposed) and secondary (computed) couplings."""
+
+    robot: Robot
+    chains: tuple[VirtualChain, ...]
+    graph: Graph
+    primary: tuple[str, ...]
+    secondary: tuple[str, ...]
+    mobility: int
+
+    @cached_property
+    def couplings(self) -> tuple[str, ...]:
+        """Names of the couplings: the columns of the network matrix."""
+        return tuple(name for name, _, _ in self.graph.edges)
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """Names of the links, virtual ones included."""
+        return self.graph.vertices
+
+    @cached_property
+    def circuit_matrix(self) -> Integers:
+        """(circuits, couplings) of -1, 0, 1."""
+        return graphs.circuit_matrix(self.graph)
+
+    @cached_property
+    def circuits(self) -> tuple[Mapping[str, int], ...]:
+        """Every circuit as coupling name to sign, in the order of the couplings."""
+        return tuple(
+            {name: int(sign) for name, sign in zip(self.couplings, row, strict=True) if sign}
+            for row in self.circuit_matrix
+        )
+
+    @cached_property
+    def circuit_names(self) -> tuple[str, ...]:
+        """What each circuit is called: its limb, or the joints that it runs through."""
+        tips = {chain.name: chain.limb.name for chain in self.chains if chain.limb}
+        names = []
+        for circuit in self.circuits:
+            limbs = [tips[c.split(".")[0]] for c in circuit if c.split(".")[0] in tips]
+            names.append(limbs[0] if limbs else "-".join(circuit))
+        return tuple(names)
+
+    @cached_property
+    def position(self) -> Mapping[str, int]:
+        """Column of every coupling."""
+        return {name: i for i, name in enumerate(self.couplings)}
+
+    @cached_property
+    def primary_columns(self) -> list[int]:
+        """Columns of the primary couplings."""
+        return [self.position[name] for name in self.primary]
+
+    @cached_property
+    def secondary_columns(self) -> list[int]:
+        """Columns of the secondary couplings."""
+        return [self.position[name] for name in self.secondary]
+
+    @cached_property
+    def blocks(self) -> list[tuple[list[int], list[int]]]:
+        """Independent systems (circuits, indices into ``secondary``) into which the secondary rates fall apart."""
+        return graphs.components(self.circuit_matrix[:, self.secondary_columns])
+
+    @cached_property
+    def kutzbach(self) -> int:
+        """Mobility by counting, 6 (links - joints - 1) + sum of freedoms: blind to special geometry."""
+        return 6 * (len(self.links) - 1) - 5 * len(self.couplings)
+
+
+def virtual_chains(robot: Robot) -> tuple[VirtualChain, ...]:
+    """The waist's chain (floating base) and one for every limb's tip."""
+    chains = [VirtualChain(WAIST, SPATIAL, None)] if robot.base == "floating" else []
+    chains += [VirtualChain(limb.tip, check_chain(limb.chain), limb) for limb in robot.limbs]
+    return tuple(chains)
+
+
+def coupling_graph(robot: Robot, chains: tuple[VirtualChain, ...]) -> Graph:
+    """Vertices and directed edges of the whole mechanism; closures weld the links they join into one vertex."""
+    welded = {name: name for name in robot.link_names}
+    if robot.base == "fixed":
+        welded[robot.base_link] = FLOOR
+    for closure in robot.closures:
+        a, b = sorted((welded[closure.link_a], welded[closure.link_b]), key=lambda name: name != FLOOR)
+        welded = {name: a if vertex == b else vertex for name, vertex in welded.items()}
+
+    edges: list[tuple[str, str, str]] = []
+    taken: set[int] = set()
+
+    def add_joints(path: tuple[int, ...]) -> None:
+        for i in path:
+            if i not in taken:
+                taken.add(i)
+                joint = robot.joints[i]
+                edges.append((joint.name, welded[joint.parent], welded[joint.child]))
+
+    def add_chain(chain: VirtualChain, end: str) -> None:
+        stations = [FLOOR, *(f"{chain.name}.{k}" for k in range(1, len(chain.couplings))), end]
+        edges.extend(zip(chain.names, stations[:-1], stations[1:], strict=True))
+
+    for chain in chains:
+        if chain.limb is None:
+            add_chain(chain, welded[robot.base_link])
+        else:
+            add_joints(robot.path_to(chain.limb.link))
+            add_chain(chain, welded[chain.limb.link])
+    add_joints(robot.traversal)
+
+    vertices = dict.fromkeys([FLOOR, *(welded[name] for name in robot.link_names)])
+    vertices |= dict.fromkeys(vertex for _, tail, head in edges for vertex in (tail, head))
+    used = {vertex for _, tail, head in edges for vertex in (tail, head)}
+    return Graph(tuple(v for v in vertices if v in used), tuple(edges))

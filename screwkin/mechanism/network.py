@@ -1,0 +1,81 @@
+"""Davies' network matrix: the circuits' screws, formed at a point that travels with the robot.
+
+Source: Bioloid paper, eq. 8-11 and 15. The circulation law N q' = 0 holds at any point; far from the robot the
+matrix loses digits (condition 1e2 at the waist, 2.5e5 at 50 m), so screws are told at the waist origin.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from screwkin.kinematics.positions import frame_pose, joint_twists, link_displacements
+from screwkin.mechanism.chains import chain_twists
+from screwkin.mechanism.mechanism import Mechanism
+from screwkin.scalar import Scalar, is_jax
+from screwkin.screw import at
+from screwkin.se3 import NO_TWIST, ZERO, Pose, Rotation, Twist, Vector, as_array, bracket
+
+
+def coupling_twists(mechanism: Mechanism, R: Rotation, q: Sequence[Scalar], point: Vector = ZERO) -> list[Twist]:
+    """Normalised screw of every coupling, world axes.
+
+    Args:
+        mechanism: the closed mechanism.
+        R: orientation of the base.
+        q: joint positions in table order.
+        point: where the screws are told, from the base origin, world axes [m]. Where the robot stands does
+            not enter: virtual translations have no place, virtual rotations pass through their body.
+    """
+    robot = mechanism.robot
+    D = link_displacements(robot, q)
+    turned = Pose(R, ZERO)
+    twists = dict(zip(robot.joint_names, joint_twists(robot, D, turned), strict=True))
+    for chain in mechanism.chains:
+        body = turned if chain.limb is None else turned @ frame_pose(robot, D, chain.limb.tip)
+        twists |= zip(chain.names, chain_twists(chain.couplings, body.R, body.p), strict=True)
+    return [at(point, twists[name]) for name in mechanism.couplings]
+
+
+def network_blocks(mechanism: Mechanism, twists: Sequence[Twist]) -> list[list[Twist]]:
+    """The network matrix as rows of signed screws: one row of blocks for every circuit."""
+    signed = {1: lambda t: t, -1: lambda t: -t, 0: lambda t: NO_TWIST}
+    return [
+        [signed[int(sign)](twist) for sign, twist in zip(row, twists, strict=True)]
+        for row in mechanism.circuit_matrix
+    ]
+
+
+def network_matrix(mechanism: Mechanism, twists: Sequence[Twist], batch: tuple[int, ...] = ()) -> Any:
+    """N (..., 6 circuits, couplings) from the couplings' screws: rows [omega; v] of every circuit."""
+    S = as_array(list(twists), batch)
+    N = mechanism.circuit_matrix[:, None, :] * S.swapaxes(-1, -2)[..., None, :, :]
+    return N.reshape(*S.shape[:-2], -1, len(mechanism.couplings))
+
+
+def twist_rates(mechanism: Mechanism, twists: Sequence[Twist], rates: Sequence[Scalar]) -> list[Twist]:
+    """Time derivative of every coupling's screw when all couplings move, told at the fixed point.
+
+    Each screw is carried by the link that bears it: its derivative is the bracket of that link's twist with it.
+    """
+    moving: dict[str, Twist] = {mechanism.links[0]: NO_TWIST}
+    derivative: dict[int, Twist] = {}
+    edges = mechanism.graph.edges
+    while len(derivative) < len(edges):
+        for i, (_, tail, head) in enumerate(edges):
+            if i not in derivative and tail in moving:
+                derivative[i] = bracket(moving[tail], twists[i])
+                moving.setdefault(head, moving[tail] + twists[i] * rates[i])
+    return [derivative[i] for i in range(len(edges))]
+
+
+def blend(columns: Sequence[int], values: Any, others: Sequence[int], rest: Any) -> Any:
+    """Values of all couplings (..., couplings) from those of two complementary sets of columns."""
+    order = np.argsort(np.array([*columns, *others]))
+    if is_jax(values) or is_jax(rest):
+        import jax.numpy as jnp
+
+        return jnp.concatenate([values, rest], axis=-1)[..., order]
+    return np.concatenate([values, rest], axis=-1)[..., order]

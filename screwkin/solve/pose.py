@@ -1,0 +1,221 @@
+"""Whole-body positions: joint positions that put base and tips where they are wanted.
+
+The loops of the closed mechanism, with waist and tips imposed, are closed by Newton's method. A block of the
+network matrix is the Jacobian; limbs that share no joint are separate small systems. A position-only target
+is a tip whose chain imposes its translations and lets its rotations monitor: their columns are eliminated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from screwkin.errors import InputError, LimitError, ShapeError, SingularError, UnreachableError
+from screwkin.kinematics.positions import chain_jacobian, successive_displacement
+from screwkin.mechanism.choice import characteristic_length
+from screwkin.mechanism.graph import components
+from screwkin.model.robot import Limb, Robot
+from screwkin.model.state import State
+from screwkin.screw import at
+from screwkin.se3 import as_array, pose_from_array, rotation_log, unstack, vector_from_array
+from screwkin.solve.newton import newton
+from screwkin.solve.status import Status
+
+Array = Any
+
+CLOSED = 1e-10
+"""Largest closure error [m and rad] that counts as converged."""
+SINGULAR = 1e-5
+"""Smallest length-normalised singular value of a limb that counts as regular."""
+
+
+@dataclass(frozen=True, eq=False)
+class PoseSolution:
+    """Positions of a batch, with a status for every limb.
+
+    Attributes:
+        state: T_world_base (..., 4, 4) and q (..., n).
+        limbs: names of the limbs that had a target.
+        status: (..., limbs) ``Status`` values.
+        residual: (..., limbs) closure error [m and rad, norm].
+        iterations: (..., limbs).
+        worst_joint: (..., limbs) index of the joint furthest beyond its limits.
+    """
+
+    state: State
+    limbs: tuple[str, ...]
+    status: Array
+    residual: Array
+    iterations: Array
+    worst_joint: Array
+
+    @property
+    def ok(self) -> bool:
+        """Every limb of every sample converged."""
+        return bool((self.status == Status.CONVERGED).all())
+
+    def raise_on_failure(self, robot: Robot, time: Array | None = None) -> None:
+        """Raise for the first sample that did not converge, naming limb, sample and how far.
+
+        Raises:
+            UnreachableError, SingularError, LimitError: as the status says.
+        """
+        if self.ok:
+            return
+        failed = np.argwhere(self.status.reshape(-1, len(self.limbs)) != Status.CONVERGED)
+        sample, limb = (int(i) for i in failed[0])
+        flat = {name: getattr(self, name).reshape(-1, len(self.limbs)) for name in ("status", "residual", "worst_joint")}
+        status, name = Status(int(flat["status"][sample, limb])), self.limbs[limb]
+        where = f"{name}, sample {sample}" + ("" if time is None else f" (t = {float(time[sample]):.3f} s)")
+        more = f"; {len(failed)} of {flat['status'].size} limb positions fail" if len(failed) > 1 else ""
+        if status is Status.UNREACHABLE:
+            far = float(flat["residual"][sample, limb])
+            raise UnreachableError(
+                f"{where}: out of reach by {1e3 * far:.3g} mm; {status.help}{more}", name, sample, far
+            )
+        if status is Status.SINGULAR:
+            raise SingularError(f"{where}: singular; {status.help}{more}", name, sample)
+        joint = robot.joints[int(flat["worst_joint"][sample, limb])]
+        q = float(np.reshape(self.state.q, (-1, len(robot.joints)))[sample, int(flat["worst_joint"][sample, limb])])
+        raise LimitError(
+            f"{where}: {joint.name} at {np.degrees(q):.1f} deg, limits {np.degrees(joint.lower):.1f} to "
+            f"{np.degrees(joint.upper):.1f} deg; {status.help}{more}"
+        )
+
+
+@dataclass(frozen=True)
+class Target:
+    """A limb's tip in the base frame: pose (B, 4, 4) or position (B, 3)."""
+
+    limb: Limb
+    value: Array
+
+    @property
+    def position_only(self) -> bool:
+        """True if the orientation is free."""
+        return self.value.ndim == 2
+
+    def residual(self, robot: Robot, q: Sequence[Array], rows: Array) -> tuple[Array, dict[int, Array]]:
+        """What is missing (A, 6 or 3), and its derivative's columns by joint index: [omega; v at the tip]."""
+        path = robot.path_to(self.limb.link)
+        screws, thetas = [robot.joints[i].screw for i in path], [q[i] for i in path]
+        tip = successive_displacement(screws, thetas, A_ref_k=self.limb.frame)
+        columns = [at(tip.p, column) for column in chain_jacobian(screws, thetas)]
+        batch = (len(rows),)
+        if self.position_only:
+            missing = as_array(vector_from_array(self.value[rows]) - tip.p, batch)
+            return missing, {i: as_array(c.v, batch) for i, c in zip(path, columns, strict=True)}
+        wanted = pose_from_array(self.value[rows])
+        turn = rotation_log(wanted.R @ tip.R.T)
+        missing = np.concatenate([as_array(turn, batch), as_array(wanted.p - tip.p, batch)], axis=-1)
+        return missing, {i: as_array(c, batch) for i, c in zip(path, columns, strict=True)}
+
+
+def solve_pose(robot: Robot, targets: Mapping[str, Array], guess: State) -> PoseSolution:
+    """Close all loops for imposed base and tips.
+
+    Args:
+        robot: the robot.
+        targets: ``"base"`` (..., 4, 4) and any tips, each a pose (..., 4, 4) or a position (..., 3), world.
+        guess: a state near the solution; joints of limbs without target keep its positions.
+
+    Returns:
+        PoseSolution; nothing is raised for samples without solution.
+    """
+    base = np.asarray(targets.get("base", guess.T_world_base), dtype=float)
+    names = [name for name in targets if name != "base"]
+    shapes = [base.shape[:-2], guess.q.shape[:-1]]
+    shapes += [targets[n].shape[:-2] if targets[n].shape[-2:] == (4, 4) else targets[n].shape[:-1] for n in names]
+    try:
+        batch = np.broadcast_shapes(*shapes)
+    except ValueError:
+        raise ShapeError(f"batches of base, targets and guess do not broadcast: {shapes}") from None
+    count = int(np.prod(batch))
+    q = np.broadcast_to(guess.q, (*batch, len(robot.joints))).reshape(count, -1).astype(float)
+    T = np.broadcast_to(base, (*batch, 4, 4)).reshape(count, 4, 4)
+    into = [Target(robot.limb(n), _in_base(T, np.asarray(targets[n], dtype=float), batch)) for n in names]
+    if not into:
+        raise InputError("no targets; name at least one tip, such as " + ", ".join(robot.tip_names[:2]))
+    parts = {name: np.zeros((count, len(into))) for name in ("status", "residual", "iterations", "worst_joint")}
+    paths = [robot.path_to(target.limb.link) for target in into]
+    shared = np.zeros((len(into), len(robot.joints)), dtype=np.int64)
+    for row, path in enumerate(paths):
+        shared[row, list(path)] = 1
+    for block, joints in components(shared):
+        _solve_block(robot, [into[i] for i in block], block, joints, q, parts)
+    for row, path in enumerate(paths):
+        _judge(robot, row, list(path), q, parts)
+    shaped = {name: value.reshape(*batch, len(into)) for name, value in parts.items()}
+    return PoseSolution(
+        State(T.reshape(*batch, 4, 4), q.reshape(*batch, -1)),
+        tuple(target.limb.name for target in into),
+        shaped["status"].astype(int),
+        shaped["residual"],
+        shaped["iterations"].astype(int),
+        shaped["worst_joint"].astype(int),
+    )
+
+
+def _in_base(T: Array, target: Array, batch: tuple[int, ...]) -> Array:
+    """A world target, flat batch, in the base frame: nothing depends on where the robot stands."""
+    if target.shape[-2:] == (4, 4):
+        flat = np.broadcast_to(target, (*batch, 4, 4)).reshape(len(T), 4, 4).copy()
+        flat[:, :3, 3] -= T[:, :3, 3]
+        flat[:, :3] = T[:, :3, :3].swapaxes(1, 2) @ flat[:, :3]
+        return flat
+    flat = np.broadcast_to(target, (*batch, 3)).reshape(len(T), 3) - T[:, :3, 3]
+    return (T[:, :3, :3].swapaxes(1, 2) @ flat[..., None])[..., 0]
+
+
+def _solve_block(
+    robot: Robot, targets: list[Target], rows: list[int], joints: list[int], q: Array, parts: dict[str, Array]
+) -> None:
+    """Newton on the limbs that share joints; fills q and the statistics of their columns."""
+    length = characteristic_length(robot)
+    sizes = [3 if target.position_only else 6 for target in targets]
+    offsets = np.concatenate([[0], np.cumsum(sizes)])
+    weights = np.concatenate([np.r_[np.ones(size - 3), np.full(3, 1 / length)] for size in sizes])
+    place = {joint: k for k, joint in enumerate(joints)}
+
+    def residual(x: Array, samples: Array) -> tuple[Array, Array]:
+        full = q[samples]
+        full[:, joints] = x
+        scalars = unstack(full)
+        r = np.zeros((len(samples), offsets[-1]))
+        J = np.zeros((len(samples), offsets[-1], len(joints)))
+        for k, target in enumerate(targets):
+            missing, columns = target.residual(robot, scalars, samples)
+            here = slice(offsets[k], offsets[k + 1])
+            r[:, here] = missing
+            for i, column in columns.items():
+                J[:, here, place[i]] = column
+        return r * weights, J * weights[:, None]
+
+    result = newton(residual, q[:, joints])
+    turning = np.array([robot.joints[i].type != "prismatic" for i in joints])
+    wrapped = (result.x + np.pi) % (2 * np.pi) - np.pi
+    far = turning & (np.abs(result.x) > np.pi)
+    q[:, joints] = np.where(far, wrapped, result.x)
+    r, J = residual(q[:, joints], np.arange(len(q)))
+    sigma = np.linalg.svd(J, compute_uv=False)[:, -1] if offsets[-1] else np.ones(len(q))
+    for k, row in enumerate(rows):
+        here = slice(offsets[k], offsets[k + 1])
+        parts["residual"][:, row] = np.linalg.norm(r[:, here] / weights[here], axis=1)
+        parts["iterations"][:, row] = result.iterations
+        closed = parts["residual"][:, row] <= CLOSED
+        parts["status"][:, row] = np.where(
+            closed, np.where(sigma < SINGULAR, Status.SINGULAR, Status.CONVERGED), Status.UNREACHABLE
+        )
+
+
+def _judge(robot: Robot, row: int, path: list[int], q: Array, parts: dict[str, Array]) -> None:
+    """Mark converged samples with a joint beyond its limits."""
+    lower = np.array([robot.joints[i].lower for i in path])
+    upper = np.array([robot.joints[i].upper for i in path])
+    beyond = np.maximum(lower - q[:, path], q[:, path] - upper)
+    parts["worst_joint"][:, row] = np.array(path)[beyond.argmax(axis=1)]
+    outside = (beyond.max(axis=1) > 1e-9) & (parts["status"][:, row] == Status.CONVERGED)
+    parts["status"][outside, row] = Status.OUT_OF_LIMITS
