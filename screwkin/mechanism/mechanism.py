@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from screwkin.mechanism import graph as graphs
 from screwkin.mechanism.chains import SPATIAL, check_chain
 from screwkin.mechanism.graph import Graph, Integers
@@ -31,6 +33,15 @@ class VirtualChain:
     def names(self) -> tuple[str, ...]:
         """Full names of its couplings, as in ``right_foot.px``."""
         return tuple(f"{self.name}.{c}" for c in self.couplings)
+
+
+@dataclass(frozen=True)
+class Closing:
+    """Two paths of couplings from the floor whose ends must coincide."""
+
+    name: str
+    path_a: tuple[str, ...]
+    path_b: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +69,30 @@ class Mechanism:
     def circuit_matrix(self) -> Integers:
         """(circuits, couplings) of -1, 0, 1."""
         return graphs.circuit_matrix(self.graph)
+
+    @cached_property
+    def closings(self) -> tuple[Closing, ...]:
+        """What closes every loop: a virtual chain's end at its tip, or a closure of the table."""
+        limbs = [Closing(c.name, self._column_path(c.limb.link), c.names) for c in self.chains if c.limb]
+        loops = [
+            Closing(c.name, self._column_path(c.link_a), self._column_path(c.link_b)) for c in self.robot.closures
+        ]
+        return (*limbs, *loops)
+
+    def _column_path(self, link: str) -> tuple[str, ...]:
+        """Names of the couplings from the floor to a link: the waist's chain, then real joints."""
+        waist = [name for chain in self.chains if chain.limb is None for name in chain.names]
+        return (*waist, *(self.robot.joints[i].name for i in self.robot.path_to(link)))
+
+    @cached_property
+    def closing_matrix(self) -> Integers:
+        """(closings, couplings) of -1, 0, 1: circuits told by what closes them, path a counting +1."""
+        C = np.zeros((len(self.closings), len(self.couplings)), dtype=np.int64)
+        for row, closing in enumerate(self.closings):
+            for sign, path in ((1, closing.path_a), (-1, closing.path_b)):
+                for name in path:
+                    C[row, self.position[name]] += sign
+        return C
 
     @cached_property
     def circuits(self) -> tuple[Mapping[str, int], ...]:

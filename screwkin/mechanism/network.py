@@ -13,6 +13,7 @@ import numpy as np
 
 from screwkin.kinematics.positions import frame_pose, joint_twists, link_displacements
 from screwkin.mechanism.chains import chain_twists
+from screwkin.mechanism.graph import Integers
 from screwkin.mechanism.mechanism import Mechanism
 from screwkin.scalar import Scalar, is_jax
 from screwkin.screw import at
@@ -48,10 +49,16 @@ def network_blocks(mechanism: Mechanism, twists: Sequence[Twist]) -> list[list[T
     ]
 
 
-def network_matrix(mechanism: Mechanism, twists: Sequence[Twist], batch: tuple[int, ...] = ()) -> Any:
-    """N (..., 6 circuits, couplings) from the couplings' screws: rows [omega; v] of every circuit."""
+def network_matrix(
+    mechanism: Mechanism, twists: Sequence[Twist], batch: tuple[int, ...] = (), circuits: Integers | None = None
+) -> Any:
+    """N (..., 6 circuits, couplings) from the couplings' screws: rows [omega; v] of every circuit.
+
+    ``circuits`` (k, couplings) is another choice of circuits than the mechanism's own.
+    """
     S = as_array(list(twists), batch)
-    N = mechanism.circuit_matrix[:, None, :] * S.swapaxes(-1, -2)[..., None, :, :]
+    B = mechanism.circuit_matrix if circuits is None else circuits
+    N = B[:, None, :] * S.swapaxes(-1, -2)[..., None, :, :]
     return N.reshape(*S.shape[:-2], -1, len(mechanism.couplings))
 
 
