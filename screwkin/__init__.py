@@ -6,9 +6,12 @@ from importlib import import_module
 from typing import Any
 
 _HOMES = {
-    "screwkin.api": (
-        "home link_poses frame_pose jacobian center_of_mass com_jacobian momentum mass_matrix inverse_dynamics"
+    "screwkin.api.body": (
+        "home link_poses frame_pose jacobian center_of_mass com_jacobian momentum mass_matrix"
+        " inverse_dynamics ground_wrench"
     ),
+    "screwkin.api.mechanism": "network_matrix virtual_motion secondary_rates solve_pose",
+    "screwkin.mechanism.choice": "closed_mechanism",
     "screwkin.model.robot": "Robot",
     "screwkin.model.state": "State",
     "screwkin.model.table": "load_robot",
@@ -17,7 +20,7 @@ _HOMES = {
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names.split()}
 
 __version__ = "0.1.0"
-__all__ = sorted(_HOME_OF)  # noqa: PLE0605
+__all__ = sorted(_HOME_OF)
 
 
 def __getattr__(name: str) -> Any:

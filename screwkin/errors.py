@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -87,7 +88,7 @@ class NoSolutionError(ScrewkinError, ArithmeticError):
 class UnreachableError(NoSolutionError):
     """A limb cannot reach its target; ``limb``, ``sample`` and ``distance`` [m] say which and how far."""
 
-    def __init__(self, message: str, limb: str = "", sample: int = -1, distance: float = float("nan")) -> None:
+    def __init__(self, message: str, limb: str = "", sample: int = -1, distance: float = math.nan) -> None:
         self.limb, self.sample, self.distance = limb, sample, distance
         super().__init__(message)
 

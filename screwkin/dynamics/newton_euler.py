@@ -14,7 +14,7 @@ from screwkin.kinematics.positions import joint_twists, link_displacements
 from screwkin.model.robot import Inertia, Robot
 from screwkin.scalar import Scalar
 from screwkin.screw import Wrench, at, power
-from screwkin.se3 import X, ZERO, Y, Z, Pose, Rotation, Twist, Vector, bracket, cross, dot
+from screwkin.se3 import ZERO, Pose, Rotation, Twist, Vector, X, Y, Z, bracket, cross, dot
 
 NO_WRENCH = Wrench(ZERO, ZERO)
 
@@ -76,7 +76,12 @@ def momentum(bodies: Bodies, qd: Sequence[Scalar], base: Twist) -> Wrench:
 
 
 def link_wrenches(
-    bodies: Bodies, qd: Sequence[Scalar], qdd: Sequence[Scalar], base: Twist, base_rate: Twist, gravity: Scalar
+    bodies: Bodies,
+    qd: Sequence[Scalar],
+    qdd: Sequence[Scalar],
+    base: Twist,
+    base_rate: Twist,
+    gravity: Scalar,
 ) -> dict[str, Wrench]:
     """Wrench that every link needs to move as it does against gravity, about the base origin."""
     V = link_twists(bodies, qd, base)
@@ -93,7 +98,12 @@ def link_wrenches(
 
 
 def ground_wrench(
-    bodies: Bodies, qd: Sequence[Scalar], qdd: Sequence[Scalar], base: Twist, base_rate: Twist, gravity: Scalar
+    bodies: Bodies,
+    qd: Sequence[Scalar],
+    qdd: Sequence[Scalar],
+    base: Twist,
+    base_rate: Twist,
+    gravity: Scalar,
 ) -> Wrench:
     """Wrench that the ground must give: rate of momentum less gravity, about the base origin."""
     total = NO_WRENCH
@@ -103,7 +113,12 @@ def ground_wrench(
 
 
 def inverse_dynamics(
-    bodies: Bodies, qd: Sequence[Scalar], qdd: Sequence[Scalar], base: Twist, base_rate: Twist, gravity: Scalar
+    bodies: Bodies,
+    qd: Sequence[Scalar],
+    qdd: Sequence[Scalar],
+    base: Twist,
+    base_rate: Twist,
+    gravity: Scalar,
 ) -> tuple[Wrench, list[Scalar]]:
     """Wrench on the base (about its origin) and joint torques (recursive Newton-Euler)."""
     robot = bodies.robot
@@ -111,7 +126,9 @@ def inverse_dynamics(
     for i in reversed(robot.traversal):
         joint = robot.joints[i]
         W[joint.parent] = W[joint.parent] + W[joint.child]
-    return W[robot.base_link], [power(W[j.child], S) for j, S in zip(robot.joints, bodies.twists, strict=True)]
+    return W[robot.base_link], [
+        power(W[j.child], S) for j, S in zip(robot.joints, bodies.twists, strict=True)
+    ]
 
 
 @dataclass(frozen=True)
@@ -149,8 +166,8 @@ def mass_matrix(bodies: Bodies) -> list[list[Scalar]]:
             i.yz - c.y * c.z * m,
         )
         composite[link.name] = Composite(m, c * m, about)
-    for i in reversed(robot.traversal):
-        joint = robot.joints[i]
+    for k in reversed(robot.traversal):
+        joint = robot.joints[k]
         composite[joint.parent] = composite[joint.parent] + composite[joint.child]
     basis = [Twist(e, ZERO) for e in (X, Y, Z)] + [Twist(ZERO, e) for e in (X, Y, Z)]
     columns = [*basis, *bodies.twists]
@@ -158,9 +175,7 @@ def mass_matrix(bodies: Bodies) -> list[list[Scalar]]:
     momenta += [composite[j.child].times(S) for j, S in zip(robot.joints, bodies.twists, strict=True)]
     M: list[list[Scalar]] = [[0.0] * len(columns) for _ in columns]
     for row, h in enumerate(momenta):
-        above = range(6) if row < 6 else [*range(6), *(6 + k for k in robot.path_to(robot.joints[row - 6].child))]
-        for column in above:
+        path = robot.path_to(robot.joints[row - 6].child) if row >= 6 else ()
+        for column in (*range(6), *(6 + k for k in path)):
             M[row][column] = M[column][row] = power(h, columns[column])
     return M
-
-

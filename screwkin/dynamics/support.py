@@ -26,7 +26,7 @@ def convex_hull(points: Array) -> Array:
 
 
 def signed_margin(points: Array, polygon: Array) -> Array:
-    """Distance (T,) from points (T, 2) to a convex polygon's border: positive inside, negative outside [m]."""
+    """Distance (T,) of points (T, 2) from a convex polygon's border [m]: positive inside, negative outside."""
     start = polygon
     edge = np.roll(polygon, -1, axis=0) - start
     length = np.linalg.norm(edge, axis=1)
@@ -70,4 +70,6 @@ def spikes(time: Array, gcom: Array, zmp: Array) -> tuple[Spike, ...]:
     above = distance > 2.0 * np.median(distance)
     peak = np.zeros_like(above)
     peak[1:-1] = (distance[1:-1] >= distance[:-2]) & (distance[1:-1] > distance[2:])
-    return tuple(Spike(float(t), float(d)) for t, d in zip(time[peak & above], distance[peak & above], strict=True))
+    return tuple(
+        Spike(float(t), float(d)) for t, d in zip(time[peak & above], distance[peak & above], strict=True)
+    )

@@ -24,7 +24,7 @@ def center_of_mass(robot: Robot, displacements: Sequence[Pose]) -> Vector:
 
 
 def com_jacobian(robot: Robot, displacements: Sequence[Pose], twists: Sequence[Twist]) -> list[Vector]:
-    """Velocity of the CoM per unit rate of each joint: its subtree's share of the mass, moved by its screw."""
+    """Velocity of the CoM per unit rate of each joint: its subtree's share of the mass, on its screw."""
     mass: dict[str, Scalar] = {}
     moment: dict[str, Vector] = {}
     for link, D in zip(robot.links, displacements, strict=True):

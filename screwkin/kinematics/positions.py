@@ -53,7 +53,7 @@ def link_displacements(robot: Robot, q: Sequence[Scalar]) -> list[Pose]:
 
 
 def joint_twists(robot: Robot, displacements: Sequence[Pose], T: Pose = IDENTITY) -> list[Twist]:
-    """Every joint's normalised screw at the present positions, in the frame to which T takes base coordinates."""
+    """Every joint's normalised screw where it is now, in the frame to which T takes base coordinates."""
     carried = dict(zip(robot.link_names, displacements, strict=True))
     return [transport(T @ carried[joint.parent], joint.screw.twist) for joint in robot.joints]
 

@@ -33,7 +33,9 @@ def check_chain(chain: Sequence[str]) -> tuple[str, ...]:
     chain = tuple(chain)
     unknown = [c for c in chain if c not in SPATIAL]
     if unknown:
-        raise InputError(f"virtual chain {chain}: unknown coupling {unknown[0]!r}; valid: {', '.join(SPATIAL)}")
+        raise InputError(
+            f"virtual chain {chain}: unknown coupling {unknown[0]!r}; valid: {', '.join(SPATIAL)}"
+        )
     if len(set(chain)) < len(chain):
         raise InputError(f"virtual chain {chain}: a coupling stands twice; each may stand once")
     kinds = [c[0] for c in chain]

@@ -21,11 +21,11 @@ from screwkin.se3 import UNTURNED, Rotation
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 RANK_TOLERANCE = 1e-6
-"""Smallest singular value, relative to the largest, of length-normalised screws that counts as independent."""
+"""Smallest singular value, relative to the largest, of length-normalised screws still independent."""
 
 
 def characteristic_length(robot: Robot) -> float:
-    """Size of the robot [m]: the largest distance of a joint axis point or tip from the base, at least 1 mm."""
+    """Size of the robot [m]: the largest distance of an axis point or tip from the base, at least 1 mm."""
     points = [j.screw.s0 for j in robot.joints] + [limb.frame.p for limb in robot.limbs]
     return max([1e-3, *(float(np.sqrt(sum(float(c) ** 2 for c in p))) for p in points)])
 
@@ -49,12 +49,12 @@ def independent(N: Array, order: Sequence[int]) -> list[int]:
     basis: list[Array] = []
     chosen = []
     for column in order:
-        v = N[:, column]
+        v: Array = N[:, column]
         rest = v
         for _ in range(2):
             for b in basis:
                 rest = rest - b * (b @ rest)
-        if np.linalg.norm(rest) > RANK_TOLERANCE * 10 * max(np.linalg.norm(v), 1e-12):
+        if np.linalg.norm(rest) > RANK_TOLERANCE * 10 * max(float(np.linalg.norm(v)), 1e-12):
             basis.append(rest / np.linalg.norm(rest))
             chosen.append(column)
     return chosen
@@ -69,7 +69,7 @@ def network_at(mechanism: Mechanism, q: Sequence[float], R: Rotation = UNTURNED)
 def preference(mechanism: Mechanism) -> list[int]:
     """Columns in the order in which they would rather be secondary.
 
-    With virtual chains: real joints, then the rotations and the translations that monitor tips, the waist last.
+    With virtual chains: real joints, then the rotations, then the translations of tips, the waist last.
     Without: the last joint of the table first, so that the first ones drive.
     """
     real = [mechanism.position[name] for name in mechanism.robot.joint_names]
@@ -139,19 +139,22 @@ def _check(mechanism: Mechanism, N: Array) -> None:
         raise InputError(
             f"{have} secondary couplings but N has rank {needed}: {have - needed} too many; "
             f"make primary: {', '.join(surplus[: have - needed])}"
-            + (f"; and make secondary instead of {', '.join(surplus[have - needed :])}: {', '.join(missing)}"
-               if missing else "")
+            + (
+                f"; and make secondary instead of {', '.join(surplus[have - needed :])}: {', '.join(missing)}"
+                if missing
+                else ""
+            )
         )
     if have < needed:
         raise InputError(
-            f"{have} secondary couplings but N has rank {needed}: {needed - have} too few, the circuits could not "
-            f"close; make secondary: {', '.join(missing[: needed - have])}"
+            f"{have} secondary couplings but N has rank {needed}: {needed - have} too few, the circuits could "
+            f"not close; make secondary: {', '.join(missing[: needed - have])}"
         )
     if surplus:
         raise SingularError(
             f"the secondary couplings are dependent (rank {len(kept)} of {needed}): make primary "
-            f"{', '.join(surplus)}, whose motion the other secondary couplings already contain, and make secondary "
-            f"{', '.join(missing)}, which nothing else can follow"
+            f"{', '.join(surplus)}, whose motion the other secondary couplings already contain, and make "
+            f"secondary {', '.join(missing)}, which nothing else can follow"
         )
 
 

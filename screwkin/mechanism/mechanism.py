@@ -75,7 +75,8 @@ class Mechanism:
         """What closes every loop: a virtual chain's end at its tip, or a closure of the table."""
         limbs = [Closing(c.name, self._column_path(c.limb.link), c.names) for c in self.chains if c.limb]
         loops = [
-            Closing(c.name, self._column_path(c.link_a), self._column_path(c.link_b)) for c in self.robot.closures
+            Closing(c.name, self._column_path(c.link_a), self._column_path(c.link_b))
+            for c in self.robot.closures
         ]
         return (*limbs, *loops)
 
@@ -129,7 +130,7 @@ class Mechanism:
 
     @cached_property
     def blocks(self) -> list[tuple[list[int], list[int]]]:
-        """Independent systems (circuits, indices into ``secondary``) into which the secondary rates fall apart."""
+        """Independent systems into which the secondary rates fall apart: (circuits, indices in ``secondary``)."""
         return graphs.components(self.circuit_matrix[:, self.secondary_columns])
 
     @cached_property
@@ -146,7 +147,7 @@ def virtual_chains(robot: Robot) -> tuple[VirtualChain, ...]:
 
 
 def coupling_graph(robot: Robot, chains: tuple[VirtualChain, ...]) -> Graph:
-    """Vertices and directed edges of the whole mechanism; closures weld the links they join into one vertex."""
+    """Vertices and directed edges of the whole mechanism; closures weld the links that they join into one."""
     welded = {name: name for name in robot.link_names}
     if robot.base == "fixed":
         welded[robot.base_link] = FLOOR

@@ -1,7 +1,7 @@
 """Davies' network matrix: the circuits' screws, formed at a point that travels with the robot.
 
-Source: Bioloid paper, eq. 8-11 and 15. The circulation law N q' = 0 holds at any point; far from the robot the
-matrix loses digits (condition 1e2 at the waist, 2.5e5 at 50 m), so screws are told at the waist origin.
+Source: Bioloid paper, eq. 8-11 and 15. The circulation law N q' = 0 holds at any point; far from the robot
+the matrix loses digits (condition 1e2 at the waist, 2.5e5 at 50 m), so screws are told at the waist origin.
 """
 
 from __future__ import annotations
@@ -20,7 +20,9 @@ from screwkin.screw import at
 from screwkin.se3 import NO_TWIST, ZERO, Pose, Rotation, Twist, Vector, as_array, bracket
 
 
-def coupling_twists(mechanism: Mechanism, R: Rotation, q: Sequence[Scalar], point: Vector = ZERO) -> list[Twist]:
+def coupling_twists(
+    mechanism: Mechanism, R: Rotation, q: Sequence[Scalar], point: Vector = ZERO
+) -> list[Twist]:
     """Normalised screw of every coupling, world axes.
 
     Args:
@@ -50,7 +52,10 @@ def network_blocks(mechanism: Mechanism, twists: Sequence[Twist]) -> list[list[T
 
 
 def network_matrix(
-    mechanism: Mechanism, twists: Sequence[Twist], batch: tuple[int, ...] = (), circuits: Integers | None = None
+    mechanism: Mechanism,
+    twists: Sequence[Twist],
+    batch: tuple[int, ...] = (),
+    circuits: Integers | None = None,
 ) -> Any:
     """N (..., 6 circuits, couplings) from the couplings' screws: rows [omega; v] of every circuit.
 
@@ -65,7 +70,7 @@ def network_matrix(
 def twist_rates(mechanism: Mechanism, twists: Sequence[Twist], rates: Sequence[Scalar]) -> list[Twist]:
     """Time derivative of every coupling's screw when all couplings move, told at the fixed point.
 
-    Each screw is carried by the link that bears it: its derivative is the bracket of that link's twist with it.
+    The link that bears a screw carries it: the derivative is the bracket of that link's twist with it.
     """
     moving: dict[str, Twist] = {mechanism.links[0]: NO_TWIST}
     derivative: dict[int, Twist] = {}

@@ -37,7 +37,9 @@ def chain_rates(chain: Sequence[str], R: Rotation, omega: Vector, v: Vector) -> 
     return [(moving if c[0] == "p" else turning)[c[1]] for c in chain]
 
 
-def chain_accelerations(chain: Sequence[str], R: Rotation, omega: Vector, alpha: Vector, a: Vector) -> list[Scalar]:
+def chain_accelerations(
+    chain: Sequence[str], R: Rotation, omega: Vector, alpha: Vector, a: Vector
+) -> list[Scalar]:
     """Second derivatives of a chain's coordinates, from the body's alpha and its origin's acceleration."""
     directions = _axes(chain, R)
     rates = _shares(directions, omega)

@@ -128,7 +128,9 @@ def close_loops(mechanism: Mechanism, guess: State, imposed: Mapping[str, Array]
         full = x[samples]
         full[:, columns] = secondary
         scalars, fixed = unstack(full), pose_from_array(flat_T[samples])
-        missing = as_array(closure_errors(mechanism, scalars, fixed), (len(samples),)).reshape(len(samples), -1)
+        missing = as_array(closure_errors(mechanism, scalars, fixed), (len(samples),)).reshape(
+            len(samples), -1
+        )
         joints = [scalars[mechanism.position[name]] for name in mechanism.robot.joint_names]
         turned = base_pose(mechanism, scalars, fixed).R
         twists = coupling_twists(mechanism, turned, joints, ZERO)
@@ -140,8 +142,12 @@ def close_loops(mechanism: Mechanism, guess: State, imposed: Mapping[str, Array]
     _, Ns = residual(result.x, np.arange(count))
     sigma = np.linalg.svd(Ns, compute_uv=False)[:, len(columns) - 1]
     closed = result.residual * max(1.0, length) <= CLOSED
-    status = np.where(closed, np.where(sigma < SINGULAR, Status.SINGULAR, Status.CONVERGED), Status.UNREACHABLE)
-    status = np.where((status == Status.CONVERGED) & _beyond_limits(mechanism, x), Status.OUT_OF_LIMITS, status)
+    status = np.where(
+        closed, np.where(sigma < SINGULAR, Status.SINGULAR, Status.CONVERGED), Status.UNREACHABLE
+    )
+    status = np.where(
+        (status == Status.CONVERGED) & _beyond_limits(mechanism, x), Status.OUT_OF_LIMITS, status
+    )
     poses = as_array(base_pose(mechanism, unstack(x), pose_from_array(flat_T)), (count,))
     joints = x[:, [mechanism.position[name] for name in mechanism.robot.joint_names]]
     return ClosureSolution(

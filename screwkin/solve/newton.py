@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
-Residual = Callable[[Array, Array], tuple[Array, Array]]
+Indices = np.ndarray[Any, np.dtype[np.int64]]
+Residual = Callable[[Array, Indices], tuple[Array, Array]]
 """(x (A, n), indices of the samples (A,)) to residual (A, m) and Jacobian (A, m, n) with J dx = residual."""
 
 
@@ -19,7 +20,7 @@ class NewtonResult:
 
     x: Array
     residual: Array
-    iterations: np.ndarray[Any, np.dtype[np.int64]]
+    iterations: Indices
 
 
 def newton(
@@ -39,7 +40,7 @@ def newton(
         max_step: largest change of a coordinate in one step [rad or m].
     """
     x = x0.copy()
-    everyone = np.arange(len(x))
+    everyone = np.arange(len(x), dtype=np.int64)
     r, J = residual(x, everyone)
     best = np.linalg.norm(r, axis=1)
     damping = np.zeros(len(x))

@@ -67,7 +67,10 @@ class PoseSolution:
             return
         failed = np.argwhere(self.status.reshape(-1, len(self.limbs)) != Status.CONVERGED)
         sample, limb = (int(i) for i in failed[0])
-        flat = {name: getattr(self, name).reshape(-1, len(self.limbs)) for name in ("status", "residual", "worst_joint")}
+        flat = {
+            name: getattr(self, name).reshape(-1, len(self.limbs))
+            for name in ("status", "residual", "worst_joint")
+        }
         status, name = Status(int(flat["status"][sample, limb])), self.limbs[limb]
         where = f"{name}, sample {sample}" + ("" if time is None else f" (t = {float(time[sample]):.3f} s)")
         more = f"; {len(failed)} of {flat['status'].size} limb positions fail" if len(failed) > 1 else ""
@@ -79,7 +82,9 @@ class PoseSolution:
         if status is Status.SINGULAR:
             raise SingularError(f"{where}: singular; {status.help}{more}", name, sample)
         joint = robot.joints[int(flat["worst_joint"][sample, limb])]
-        q = float(np.reshape(self.state.q, (-1, len(robot.joints)))[sample, int(flat["worst_joint"][sample, limb])])
+        q = float(
+            np.reshape(self.state.q, (-1, len(robot.joints)))[sample, int(flat["worst_joint"][sample, limb])]
+        )
         raise LimitError(
             f"{where}: {joint.name} at {np.degrees(q):.1f} deg, limits {np.degrees(joint.lower):.1f} to "
             f"{np.degrees(joint.upper):.1f} deg; {status.help}{more}"
@@ -128,7 +133,9 @@ def solve_pose(robot: Robot, targets: Mapping[str, Array], guess: State) -> Pose
     base = np.asarray(targets.get("base", guess.T_world_base), dtype=float)
     names = [name for name in targets if name != "base"]
     shapes = [base.shape[:-2], guess.q.shape[:-1]]
-    shapes += [targets[n].shape[:-2] if targets[n].shape[-2:] == (4, 4) else targets[n].shape[:-1] for n in names]
+    shapes += [
+        targets[n].shape[:-2] if targets[n].shape[-2:] == (4, 4) else targets[n].shape[:-1] for n in names
+    ]
     try:
         batch = np.broadcast_shapes(*shapes)
     except ValueError:
@@ -139,7 +146,9 @@ def solve_pose(robot: Robot, targets: Mapping[str, Array], guess: State) -> Pose
     into = [Target(robot.limb(n), _in_base(T, np.asarray(targets[n], dtype=float), batch)) for n in names]
     if not into:
         raise InputError("no targets; name at least one tip, such as " + ", ".join(robot.tip_names[:2]))
-    parts = {name: np.zeros((count, len(into))) for name in ("status", "residual", "iterations", "worst_joint")}
+    parts = {
+        name: np.zeros((count, len(into))) for name in ("status", "residual", "iterations", "worst_joint")
+    }
     paths = [robot.path_to(target.limb.link) for target in into]
     shared = np.zeros((len(into), len(robot.joints)), dtype=np.int64)
     for row, path in enumerate(paths):

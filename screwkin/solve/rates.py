@@ -1,7 +1,7 @@
 """Secondary rates and accelerations from the primary ones: Davies' method, batched.
 
-Source: Bioloid paper, eq. 10-11. The system falls apart into blocks of circuits that share secondary couplings
-(for a humanoid whose waist is imposed: one limb each), and each block is one small solve.
+Source: Bioloid paper, eq. 10-11. The system falls apart into blocks of circuits that share secondary
+couplings (for a humanoid whose waist is imposed: one limb each), and each block is one small solve.
 """
 
 from __future__ import annotations

@@ -55,9 +55,13 @@ def singularity_report(mechanism: Mechanism, N: Array) -> tuple[LimbSingularity,
         names = [mechanism.couplings[chosen[k]] for k in taking]
         screws = _screws(scaled[worst], mechanism, [chosen[k] for k in taking])
         near = bool(sigma[worst] < NEAR)
-        cause = _cause(names, screws) if near else ""
+        span = range(chosen[taking[0]] + 1, chosen[taking[-1]])
+        between = [mechanism.couplings[c] for c in span if c in chosen]
+        cause = _cause(names, screws, between) if near else ""
         report.append(
-            LimbSingularity(block_name(mechanism, circuits), worst, float(sigma[worst]), near, tuple(names), cause)
+            LimbSingularity(
+                block_name(mechanism, circuits), worst, float(sigma[worst]), near, tuple(names), cause
+            )
         )
     return tuple(report)
 
@@ -68,23 +72,29 @@ def _screws(N: Array, mechanism: Mechanism, columns: Sequence[int]) -> Array:
     return np.array([N[6 * r : 6 * r + 6, c] for r, c in zip(rows, columns, strict=True)])
 
 
-def _cause(names: Sequence[str], screws: Array) -> str:
-    """What is special about dependent screws, in words."""
+def _cause(names: Sequence[str], screws: Array, between: Sequence[str]) -> str:
+    """What is special about dependent screws, in words; ``between`` are the joints from first to last."""
     turning = np.linalg.norm(screws[:, :3], axis=1) > 1e-9
     axes = screws[turning, :3]
     listed = ", ".join(names)
     if len(names) == 1:
         return f"{names[0]} cannot move its body in a direction that the loop allows"
-    if turning.all() and np.linalg.norm(np.cross(axes, axes[0]), axis=1).max() < 0.05:
+    parallel = turning.all() and np.linalg.norm(np.cross(axes, axes[0]), axis=1).max() < 0.05
+    if parallel and len(names) == 2:
+        turned = f": {', '.join(between)} between them is near +-90 deg" if between else ""
+        return f"the axes of {listed} fall together{turned}"
+    if parallel:
         middle = names[len(names) // 2]
         return f"the parallel axes of {listed} lie in one plane: {middle} is near straight or fully folded"
     virtual = [name for name in names if "." in name]
     if virtual and len(virtual) == len(names):
-        return f"the virtual rotations {listed} lie in one plane: {virtual[len(virtual) // 2]} is near +-90 deg"
+        return (
+            f"the virtual rotations {listed} lie in one plane: {virtual[len(virtual) // 2]} is near +-90 deg"
+        )
     if turning.all() and _concurrent(screws):
         middle = names[len(names) // 2]
         return f"the axes of {listed} meet in a point and lie in one plane: {middle} is near +-90 deg"
-    return f"the screws of {listed} are dependent: a force along or a couple about their common reciprocal does no work"
+    return f"the screws of {listed} are dependent: a wrench exists that does no work on any of them"
 
 
 def _concurrent(screws: Array) -> bool:

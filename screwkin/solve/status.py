@@ -18,7 +18,7 @@ class Status(IntEnum):
         """What happened and what to change."""
         return {
             Status.CONVERGED: "the loops close and every joint is within its limits",
-            Status.UNREACHABLE: "no joint positions close the loop; bring the target nearer to the limb's root",
-            Status.SINGULAR: "the limb has lost a direction of motion; bend it, or make another coupling primary",
+            Status.UNREACHABLE: "no joint positions close the loop; bring the target nearer",
+            Status.SINGULAR: "the limb has lost a direction of motion; bend it, or impose another coupling",
             Status.OUT_OF_LIMITS: "the loop closes only with a joint beyond its limits; move the target",
         }[self]

@@ -1,8 +1,4 @@
-"""Public functions over arrays: they check, compute with the formulas, and convert.
-
-Everything takes leading batch dimensions. NumPy in gives NumPy out (float64), JAX in gives JAX out, so the
-same functions go through ``jax.jit``, ``jax.vmap`` and ``jax.grad``.
-"""
+"""Positions, Jacobians and dynamics of the body."""
 
 from __future__ import annotations
 
@@ -10,73 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from screwkin.api.arrays import Array, checked, joint_scalars, parts, twist_of
 from screwkin.dynamics import newton_euler
-from screwkin.errors import ShapeError
-from screwkin.kinematics import mass as _mass
-from screwkin.kinematics import positions
+from screwkin.kinematics import mass, positions
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
-from screwkin.scalar import is_jax
 from screwkin.screw import at, wrench_at
-from screwkin.se3 import (
-    NO_TWIST,
-    ZERO,
-    Pose,
-    Twist,
-    X,
-    Y,
-    Z,
-    as_array,
-    pose_from_array,
-    twist_from_array,
-    unstack,
-    vector_from_array,
-)
-
-Array = Any
-
-
-def checked(name: str, array: Any, *shape: int) -> Array:
-    """The array as float64 NumPy or as JAX, with its trailing shape and its values checked.
-
-    Raises:
-        ShapeError: wrong trailing shape, NaN or infinity, or a float32 JAX array.
-    """
-    if is_jax(array):
-        if array.dtype == np.float32:
-            raise ShapeError(f'{name} is a float32 JAX array; switch on jax.config.update("jax_enable_x64", True)')
-    else:
-        try:
-            array = np.asarray(array, dtype=float)
-        except (TypeError, ValueError) as error:
-            raise ShapeError(f"{name} is not an array of numbers: {error}") from None
-        if not np.isfinite(array).all():
-            raise ShapeError(f"{name} holds NaN or infinity; every number must be finite")
-    if array.shape[array.ndim - len(shape) :] != shape or array.ndim < len(shape):
-        wanted = ", ".join(["...", *map(str, shape)])
-        raise ShapeError(f"{name} has shape {tuple(array.shape)}, expected ({wanted})")
-    return array
-
-
-def _parts(robot: Robot, state: State) -> tuple[Pose, list[Any], tuple[int, ...]]:
-    """Base pose, joint scalars and batch shape of a checked state."""
-    T = checked("state.T_world_base", state.T_world_base, 4, 4)
-    q = checked("state.q", state.q, len(robot.joints))
-    try:
-        batch = np.broadcast_shapes(T.shape[:-2], q.shape[:-1])
-    except ValueError:
-        raise ShapeError(
-            f"batch of state.T_world_base {T.shape[:-2]} and of state.q {q.shape[:-1]} do not broadcast"
-        ) from None
-    return pose_from_array(T), unstack(q), batch
-
-
-def _rates(robot: Robot, name: str, values: Any) -> list[Any]:
-    return unstack(checked(name, values, len(robot.joints)))
-
-
-def _twist(name: str, value: Any) -> Twist:
-    return NO_TWIST if value is None else twist_from_array(checked(name, value, 6))
+from screwkin.se3 import NO_TWIST, ZERO, Pose, Twist, X, Y, Z, as_array, vector_from_array
 
 
 def home(robot: Robot, posture: str = "home") -> State:
@@ -106,7 +42,7 @@ def link_poses(robot: Robot, state: State) -> Array:
 
     Source: Bioloid paper, eq. 2-3.
     """
-    T, q, batch = _parts(robot, state)
+    T, q, batch = parts(robot, state)
     D = positions.link_displacements(robot, q)
     return as_array([T @ (d @ link.frame) for d, link in zip(D, robot.links, strict=True)], batch)
 
@@ -117,7 +53,7 @@ def frame_pose(robot: Robot, state: State, frame: str) -> Array:
     Raises:
         UnknownNameError: no such frame; the message lists all frames.
     """
-    T, q, batch = _parts(robot, state)
+    T, q, batch = parts(robot, state)
     return as_array(T @ positions.frame_pose(robot, positions.link_displacements(robot, q), frame), batch)
 
 
@@ -133,7 +69,7 @@ def jacobian(robot: Robot, state: State, frame: str, point: Any = None) -> Array
         frame: ``base``, a link or a tip.
         point: world point (..., 3) [m] at which twists are told; default: the frame's own origin.
     """
-    T, q, batch = _parts(robot, state)
+    T, q, batch = parts(robot, state)
     turned = Pose(T.R, ZERO)
     D = positions.link_displacements(robot, q)
     if point is None:
@@ -152,23 +88,23 @@ def _last_axes_swapped(array: Array) -> Array:
 
 def center_of_mass(robot: Robot, state: State) -> Array:
     """World position (..., 3) of the centre of mass [m]."""
-    T, q, batch = _parts(robot, state)
-    return as_array(T @ _mass.center_of_mass(robot, positions.link_displacements(robot, q)), batch)
+    T, q, batch = parts(robot, state)
+    return as_array(T @ mass.center_of_mass(robot, positions.link_displacements(robot, q)), batch)
 
 
 def com_jacobian(robot: Robot, state: State) -> Array:
     """Velocity of the CoM (..., 3, 6+n), world axes, per [base twist at the base origin; qd]."""
-    T, q, batch = _parts(robot, state)
+    T, q, batch = parts(robot, state)
     turned = Pose(T.R, ZERO)
     D = [turned @ d for d in positions.link_displacements(robot, q)]
     twists = positions.joint_twists(robot, positions.link_displacements(robot, q), turned)
-    c = _mass.center_of_mass(robot, D)
+    c = mass.center_of_mass(robot, D)
     spin = [at(c, Twist(e, ZERO)).v for e in (X, Y, Z)]
-    return _last_axes_swapped(as_array([*spin, X, Y, Z, *_mass.com_jacobian(robot, D, twists)], batch))
+    return _last_axes_swapped(as_array([*spin, X, Y, Z, *mass.com_jacobian(robot, D, twists)], batch))
 
 
 def _bodies(robot: Robot, state: State) -> tuple[newton_euler.Bodies, tuple[int, ...]]:
-    T, q, batch = _parts(robot, state)
+    T, q, batch = parts(robot, state)
     return newton_euler.Bodies.of(robot, T.R, q), batch
 
 
@@ -182,7 +118,7 @@ def momentum(robot: Robot, state: State, qd: Any, base_twist: Any = None) -> Arr
         base_twist: [omega; v of the base origin] in world axes (..., 6); default at rest.
     """
     bodies, batch = _bodies(robot, state)
-    h = newton_euler.momentum(bodies, _rates(robot, "qd", qd), _twist("base_twist", base_twist))
+    h = newton_euler.momentum(bodies, joint_scalars(robot, "qd", qd), twist_of("base_twist", base_twist))
     c = ZERO
     for link, B in zip(robot.links, bodies.poses, strict=True):
         c = c + (B @ link.com) * (link.mass / robot.mass)
@@ -219,26 +155,32 @@ def inverse_dynamics(
     bodies, batch = _bodies(robot, state)
     wrench, torques = newton_euler.inverse_dynamics(
         bodies,
-        _rates(robot, "qd", qd),
-        _rates(robot, "qdd", qdd),
-        _twist("base_twist", base_twist),
-        _twist("base_acceleration", base_acceleration),
+        joint_scalars(robot, "qd", qd),
+        joint_scalars(robot, "qdd", qdd),
+        twist_of("base_twist", base_twist),
+        twist_of("base_acceleration", base_acceleration),
         gravity,
     )
     return as_array([*wrench.m, *wrench.f, *torques], batch)
 
 
 def ground_wrench(
-    robot: Robot, state: State, qd: Any, qdd: Any, base_twist: Any, base_acceleration: Any, gravity: float = 9.81
+    robot: Robot,
+    state: State,
+    qd: Any,
+    qdd: Any,
+    base_twist: Any,
+    base_acceleration: Any,
+    gravity: float = 9.81,
 ) -> Array:
     """Wrench (..., 6) that the ground must give, [m; f] about the world origin, world axes."""
-    T, q, batch = _parts(robot, state)
+    T, q, batch = parts(robot, state)
     wrench = newton_euler.ground_wrench(
         newton_euler.Bodies.of(robot, T.R, q),
-        _rates(robot, "qd", qd),
-        _rates(robot, "qdd", qdd),
-        _twist("base_twist", base_twist),
-        _twist("base_acceleration", base_acceleration),
+        joint_scalars(robot, "qd", qd),
+        joint_scalars(robot, "qdd", qdd),
+        twist_of("base_twist", base_twist),
+        twist_of("base_acceleration", base_acceleration),
         gravity,
     )
     about = wrench_at(-T.p, wrench)

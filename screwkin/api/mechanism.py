@@ -1,0 +1,169 @@
+"""The closed mechanism over arrays: network matrix, rates by Davies' method, whole-body positions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import numpy as np
+
+from screwkin.api.arrays import Array, checked, parts, twist_of
+from screwkin.api.body import home
+from screwkin.errors import InputError, SingularError, UnknownNameError
+from screwkin.kinematics import positions
+from screwkin.mechanism import network
+from screwkin.mechanism import virtual_motion as virtual
+from screwkin.mechanism.mechanism import Mechanism
+from screwkin.model.robot import Robot
+from screwkin.model.state import State
+from screwkin.se3 import ZERO, Twist, as_array, vector_from_array
+from screwkin.solve import pose as pose_solver
+from screwkin.solve import rates
+from screwkin.solve.pose import PoseSolution
+from screwkin.solve.status import Status
+
+
+def network_matrix(mechanism: Mechanism, state: State, point: Any = None) -> Array:
+    """Davies' network matrix N (..., 6 circuits, couplings): N q' = 0, rows [omega; v] of every circuit.
+
+    Args:
+        mechanism: from ``closed_mechanism``; its ``couplings`` name the columns.
+        state: a (closed) state.
+        point: world point (..., 3) [m] where the screws are told; default: the waist origin, which travels
+            with the robot. A far point spoils the conditioning.
+
+    Source: Bioloid paper, eq. 8-9.
+    """
+    T, q, batch = parts(mechanism.robot, state)
+    p = ZERO if point is None else vector_from_array(checked("point", point, 3)) - T.p
+    if point is not None:
+        batch = np.broadcast_shapes(batch, np.shape(point)[:-1])
+    return network.network_matrix(mechanism, network.coupling_twists(mechanism, T.R, q, p), batch)
+
+
+def virtual_motion(
+    mechanism: Mechanism, state: State, base_twist: Any, tip_twists: Mapping[str, Any], rate: Any = None
+) -> Array:
+    """Rates (..., primary) of the primary virtual couplings that give base and tips their twists.
+
+    Args:
+        mechanism: its primary couplings must all belong to virtual chains.
+        state: the present state.
+        base_twist: [omega; v of the base origin] (..., 6), world axes; ignored with a fixed base.
+        tip_twists: for every tip with primary couplings: [omega; v of the tip origin] (..., 6), or v alone
+            (..., 3) where only translations are primary.
+        rate: for second derivatives, the same as ``(base_acceleration, tip_accelerations)``: the result then
+            holds the couplings' accelerations.
+
+    Raises:
+        InputError: a real joint is primary, or a tip's twist is missing.
+
+    Source: Bioloid paper, eq. 7.
+    """
+    T, q, batch = parts(mechanism.robot, state)
+    D = positions.link_displacements(mechanism.robot, q)
+    motion: dict[str, Any] = {}
+    for chain in mechanism.chains:
+        wanted = [name for name in chain.names if name in mechanism.primary]
+        if not wanted:
+            continue
+        given = base_twist if chain.limb is None else tip_twists.get(chain.name)
+        if given is None:
+            raise InputError(
+                f"tip_twists lacks {chain.name}, whose couplings {', '.join(wanted)} are primary"
+            )
+        twist, turns = _body_twist(chain.name, given)
+        if not turns and any(name.split(".")[1][0] == "r" for name in wanted):
+            raise InputError(
+                f"tip_twists[{chain.name!r}] has 3 components, but rotations of its chain are primary"
+            )
+        R = T.R if chain.limb is None else (T @ positions.frame_pose(mechanism.robot, D, chain.name)).R
+        if rate is None:
+            rates = virtual.chain_rates(chain.couplings, R, twist.omega, twist.v)
+        else:
+            second, _ = _body_twist(chain.name, rate[0] if chain.limb is None else rate[1][chain.name])
+            rates = virtual.chain_accelerations(chain.couplings, R, twist.omega, second.omega, second.v)
+        motion |= dict(zip(chain.names, rates, strict=True))
+    real = [name for name in mechanism.primary if name not in motion]
+    if real:
+        raise InputError(
+            f"primary couplings {', '.join(real)} belong to no virtual chain; give their rates directly"
+        )
+    return as_array([motion[name] for name in mechanism.primary], batch)
+
+
+def _body_twist(name: str, value: Any) -> tuple[Twist, bool]:
+    """A twist from (..., 6) or (..., 3), and whether it tells rotation."""
+    turns = np.shape(value)[-1:] != (3,)
+    if turns:
+        return twist_of(name, value), True
+    return Twist(ZERO, vector_from_array(checked(name, value, 3))), False
+
+
+def secondary_rates(
+    mechanism: Mechanism, state: State, primary_rates: Any, on_singular: Literal["raise", "status"] = "raise"
+) -> Any:
+    """Rates (..., secondary) of the computed couplings from those of the imposed ones, by Davies' method.
+
+    Args:
+        mechanism: from ``closed_mechanism``.
+        state: a closed state.
+        primary_rates: (..., primary), in ``mechanism.primary`` order [rad/s, m/s].
+        on_singular: ``"raise"``, or ``"status"`` to get (rates, status (...,)) with ``Status.SINGULAR``
+            marking samples solved by least squares. Traced JAX arrays cannot raise: use ``"status"`` there.
+
+    Raises:
+        SingularError: a limb is singular; names limb and sample.
+
+    Source: Bioloid paper, eq. 10-11.
+    """
+    primary = checked("primary_rates", primary_rates, len(mechanism.primary))
+    solution = rates.secondary_rates(mechanism, network_matrix(mechanism, state), primary)
+    singular = solution.singular
+    if on_singular == "status":
+        return solution.values, singular.any(axis=-1) * int(Status.SINGULAR)
+    if on_singular != "raise":
+        raise InputError(f"on_singular is {on_singular!r}; valid: raise, status")
+    if singular.any():
+        sample, block = (int(i) for i in np.argwhere(np.reshape(singular, (-1, singular.shape[-1])))[0])
+        raise SingularError(
+            f"{solution.blocks[block]}, sample {sample}: singular; {Status.SINGULAR.help}",
+            solution.blocks[block],
+            sample,
+        )
+    return solution.values
+
+
+def solve_pose(
+    robot: Robot,
+    targets: Mapping[str, Any],
+    guess: State | None = None,
+    method: Literal["auto", "newton"] = "auto",
+) -> PoseSolution:
+    """Joint positions that put base and tips where they are wanted, batched.
+
+    Args:
+        robot: the robot.
+        targets: ``"base"`` (..., 4, 4) and tips by name: a pose (..., 4, 4), or a position (..., 3) with the
+            orientation free; world frame.
+        guess: a nearby state; default ``home``. Its base pose holds where ``"base"`` is not given.
+        method: ``"newton"``, through the network matrix; ``"auto"`` chooses.
+
+    Returns:
+        PoseSolution with ``.state .status .residual .iterations`` (..., limbs). Nothing is raised for samples
+        without solution; ``.raise_on_failure(robot)`` does.
+
+    Raises:
+        UnknownNameError: a target is no tip. ShapeError: wrong shape, NaN or infinity.
+    """
+    if method not in ("auto", "newton"):
+        raise InputError(f"method is {method!r}; valid: auto, newton")
+    wanted = {}
+    for name, value in targets.items():
+        if name != "base" and name not in robot.tip_names:
+            raise UnknownNameError("target", name, ("base", *robot.tip_names))
+        pose = np.shape(value)[-2:] == (4, 4) or name == "base"
+        wanted[name] = checked(f"targets[{name!r}]", value, *((4, 4) if pose else (3,)))
+    guess = home(robot) if guess is None else guess
+    parts(robot, guess)
+    return pose_solver.solve_pose(robot, wanted, State(np.asarray(guess.T_world_base), np.asarray(guess.q)))
