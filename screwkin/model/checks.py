@@ -1,0 +1,96 @@
+"""What must hold within one row of a robot table: inertias, limits, pitches, soles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from screwkin.errors import Fault
+from screwkin.model.rows import Rows
+from screwkin.model.schema import InertiaRow, JointRow, LinkRow, SoleRow
+
+_COMPONENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
+_RELATIVE = 1e-9  # of the greatest moment: rounding of nine written digits
+_FLAT = 1e-6  # m: far below what a floor is flat to
+
+
+def row_faults(rows: Rows) -> Iterator[Fault]:
+    """Faults within single rows whose keys and values are sound by themselves."""
+    for table, check in _CHECKS.items():
+        for where, row in rows.good(table):
+            for key, found, fix in check(row):
+                yield Fault(where, key, found, fix)
+
+
+def _link(link: LinkRow) -> Iterator[tuple[str, str, str]]:
+    if link.mass > 0 and link.com is None:
+        yield "com", "is missing", "Write com = [x, y, z] in m, or mass = 0"
+    if link.inertia is not None:
+        yield from _inertia(link.inertia)
+    elif link.mass > 0:
+        yield (
+            "inertia",
+            "is missing",
+            "Write { box = [lx, ly, lz] } or { xx, yy, zz, xy, xz, yz }, or mass = 0",
+        )
+
+
+def _inertia(inertia: InertiaRow) -> Iterator[tuple[str, str, str]]:
+    given = [name for name in _COMPONENTS if name in inertia.model_fields_set]
+    fix = "Write either { box = [lx, ly, lz] }, or { xx, yy, zz } and, where not 0, xy, xz, yz"
+    if (inertia.box is not None) == bool(given):
+        yield "inertia", "is both a box and components" if given else "is empty", fix
+        return
+    if inertia.box is not None:
+        return
+    absent = [name for name in _COMPONENTS[:3] if name not in given]
+    if absent:
+        yield "inertia", f"{', '.join(absent)} missing", fix
+        return
+    xx, yy, zz, xy, xz, yz = (float(getattr(inertia, name)) for name in _COMPONENTS)
+    a, b, c = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    told = f"principal moments ({a:.6g}, {b:.6g}, {c:.6g})"
+    about = "Give the inertia about the CoM in base axes"
+    if a < -_RELATIVE * abs(c) or c < 0:
+        yield "inertia", f"{told} are not all >= 0: no body has them", about
+    elif c > (a + b) * (1 + _RELATIVE):
+        found = f"{told} break the triangle inequality: {c:.6g} > {a:.6g} + {b:.6g}, no body has them"
+        yield "inertia", found, about
+
+
+def _joint(joint: JointRow) -> Iterator[tuple[str, str, str]]:
+    if joint.type == "helical" and not joint.pitch:
+        yield "pitch", "is missing or 0", "Write the finite advance in m/rad, or make the joint revolute"
+    if joint.type != "helical" and joint.pitch:
+        yield "pitch", f"{joint.pitch:g} on a {joint.type} joint", 'Leave it out, or write type = "helical"'
+    if joint.lower > joint.upper:
+        yield "lower", f"{joint.lower:g} is above upper {joint.upper:g}", "Swap the limits"
+
+
+def _sole(sole: SoleRow) -> Iterator[tuple[str, str, str]]:
+    if len(sole.corners) < 3:
+        yield "corners", f"{len(sole.corners)} given", "Write three or more corners"
+        return
+    corners = np.array([[float(c) for c in corner] for corner in sole.corners])
+    edges = np.roll(corners, -1, axis=0) - corners
+    after = np.roll(edges, -1, axis=0)
+    bends = edges[:, 0] * after[:, 1] - edges[:, 1] * after[:, 0]
+    ahead = edges[:, 0] * after[:, 0] + edges[:, 1] * after[:, 1]
+    turns = np.arctan2(bends, ahead).sum() / (2 * math.pi)
+    if (bends < 0).all() and round(turns) == -1:
+        yield "corners", "run clockwise seen from above", "Reverse their order"
+    elif (bends <= 0).any() or round(turns) != 1:
+        fix = "Write the corners of a convex polygon in order, counter-clockwise seen from above"
+        yield "corners", "are not convex", fix
+    elif np.linalg.svd(corners - corners.mean(axis=0), compute_uv=False)[2] > _FLAT:
+        yield "corners", "do not lie in one plane", "A sole is flat: give its corners in one plane"
+
+
+_CHECKS: Mapping[str, Callable[[Any], Iterator[tuple[str, str, str]]]] = {
+    "link": _link,
+    "joint": _joint,
+    "sole": _sole,
+}

@@ -1,0 +1,324 @@
+"""The rows of a robot table: which keys they have and what their values must be.
+
+Each row is read by itself, so that every faulty row of a file is found at once. Arithmetic strings are
+evaluated on the way, over the names handed in; rows come out with scalars and vectors in them.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, PlainValidator, ValidationError, ValidationInfo
+from pydantic_core import PydanticCustomError
+
+from screwkin.errors import Fault
+from screwkin.model.expression import ExpressionError, UnresolvedError, evaluate, listed, near
+from screwkin.model.robot import JointType, LimbKind
+from screwkin.scalar import Scalar, is_symbolic, structural
+from screwkin.se3 import Vector
+
+UNIT_TOLERANCE = 1e-9
+"""How far from 1 the length of an axis may be: what nine written digits cannot miss."""
+
+COUPLINGS = ("px", "py", "pz", "rx", "ry", "rz")
+"""Couplings of a virtual chain: translations along and rotations about x, y, z."""
+
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
+
+
+def _wrong(found: str, fix: str, unresolved: bool = False) -> PydanticCustomError:
+    """A fault on its way through pydantic; an unresolved one is reported at its parameter instead."""
+    return PydanticCustomError("fault", "fault", {"found": found, "fix": fix, "unresolved": unresolved})
+
+
+def _number(value: object, info: ValidationInfo) -> Scalar:
+    """A number of the mechanism; exactly 0, 1 or -1 becomes structure."""
+    names, _ = info.context or ({}, {})
+    return _evaluated(value, names)
+
+
+def _value(value: object, info: ValidationInfo) -> float:
+    """A number that stays a number in the symbolic twin: limits and postures."""
+    _, numbers = info.context or ({}, {})
+    return float(_evaluated(value, numbers))
+
+
+def _evaluated(value: object, names: Mapping[str, Scalar]) -> Scalar:
+    try:
+        result = evaluate(value, names)
+    except UnresolvedError as error:
+        raise _wrong(error.found, error.fix, unresolved=True) from None
+    except ExpressionError as error:
+        raise _wrong(error.found, error.fix) from None
+    return result if is_symbolic(result) else structural(result)
+
+
+def _vector(value: object, info: ValidationInfo) -> Vector:
+    if not isinstance(value, list) or len(value) != 3:
+        raise _wrong(f"{value!r} is no vector", "Write three numbers, as [x, y, z]")
+    return Vector(*(_number(component, info) for component in value))
+
+
+def _unit(value: object, info: ValidationInfo) -> Vector:
+    axis = _vector(value, info)
+    if any(is_symbolic(c) for c in axis):
+        return axis  # its numeric twin has been checked
+    length = math.hypot(*axis)
+    if length == 0:
+        raise _wrong("s is the zero vector", "Write the unit vector of the joint's axis")
+    if abs(length - 1) > UNIT_TOLERANCE:
+        normalised = ", ".join(f"{c / length:.10g}" for c in axis)
+        told = ", ".join(f"{c:g}" for c in axis)
+        raise _wrong(f"({told}) has norm {length:.10g}, expected 1", f"Write s = [{normalised}]")
+    return axis
+
+
+def _positive_vector(value: object, info: ValidationInfo) -> Vector:
+    size = _vector(value, info)
+    if any(not is_symbolic(c) and c <= 0 for c in size):
+        raise _wrong(f"edges {value!r}", "Write three positive lengths, as [lx, ly, lz]")
+    return size
+
+
+def _mass(value: object, info: ValidationInfo) -> Scalar:
+    mass = _number(value, info)
+    if not is_symbolic(mass) and mass < 0:
+        raise _wrong(f"mass {mass:g} is negative", "Write a mass >= 0 in kg")
+    return mass
+
+
+def _positive(value: object, info: ValidationInfo) -> float:
+    number = _value(value, info)
+    if number <= 0:
+        raise _wrong(f"{number:g} is not positive", "Write a positive number, or leave it out for no limit")
+    return number
+
+
+def _name(value: object) -> str:
+    if not isinstance(value, str) or not _NAME.fullmatch(value):
+        fix = "Write letters, digits, _ and -, beginning with a letter"
+        raise _wrong(f"{value!r} is not a name", fix)
+    return value
+
+
+def _chain(value: object) -> tuple[str, ...]:
+    whole = listed(COUPLINGS)
+    if not isinstance(value, list) or not value or any(c not in COUPLINGS for c in value):
+        raise _wrong(f"{value!r} is no virtual chain", f"List couplings from floor to tip, out of {whole}")
+    if len(set(value)) < len(value):
+        raise _wrong(f"{value!r} has a coupling twice", f"List each of {whole} at most once")
+    return tuple(value)
+
+
+Name = Annotated[str, PlainValidator(_name)]
+Number = Annotated[Scalar, PlainValidator(_number)]
+Mass = Annotated[Scalar, PlainValidator(_mass)]
+Value = Annotated[float, PlainValidator(_value)]
+Positive = Annotated[float, PlainValidator(_positive)]
+Point = Annotated[Vector, PlainValidator(_vector)]
+Unit = Annotated[Vector, PlainValidator(_unit)]
+Size = Annotated[Vector, PlainValidator(_positive_vector)]
+Chain = Annotated[tuple[str, ...], PlainValidator(_chain)]
+
+
+class Row(BaseModel):
+    """A row or an inline table; unknown keys are faults."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, arbitrary_types_allowed=True)
+
+
+class RobotRow(Row):
+    """[robot]: what the table describes."""
+
+    name: Name = Field(description="name of the robot")
+    description: str = Field("", description="one sentence")
+    source: str = Field("", description="where the numbers come from")
+    base_link: Name = Field(description="name of the link that carries the base frame")
+    base: Literal["floating", "fixed"] = Field(description='"floating" or "fixed"')
+
+
+class FrameRow(Row):
+    """A frame in the zero pose: origin [m] and roll, pitch, yaw about the fixed base axes [rad]."""
+
+    xyz: Point = Field(description="origin [x, y, z] in m")
+    rpy: Point = Field(Vector(0, 0, 0), description="angles [roll, pitch, yaw] in rad")
+
+
+class BoxRow(Row):
+    """A box with edges along the base axes in the zero pose."""
+
+    center: Point = Field(description="centre [x, y, z] in m")
+    size: Size = Field(description="edges [lx, ly, lz] in m")
+
+
+class InertiaRow(Row):
+    """Inertia about the CoM: the edges of a solid box that has it, or its six components [kg m^2]."""
+
+    box: Size | None = Field(None, description="edges [lx, ly, lz] of a solid box in m")
+    xx: Number = Field(None, description="a number in kg m^2")
+    yy: Number = Field(None, description="a number in kg m^2")
+    zz: Number = Field(None, description="a number in kg m^2")
+    xy: Number = Field(0, description="a number in kg m^2")
+    xz: Number = Field(0, description="a number in kg m^2")
+    yz: Number = Field(0, description="a number in kg m^2")
+
+
+class LinkRow(Row):
+    """[[link]]: a rigid body. CoM and inertia may be left out of a massless one."""
+
+    name: Name = Field(description="name of the link")
+    mass: Mass = Field(description="mass in kg; 0 for a massless bracket")
+    com: Point | None = Field(None, description="centre of mass [x, y, z] in m")
+    inertia: InertiaRow | None = Field(
+        None, description="{ box = [lx, ly, lz] } or { xx, yy, zz, xy, xz, yz }"
+    )
+    frame: FrameRow | None = Field(None, description="{ xyz = [x, y, z], rpy = [roll, pitch, yaw] }")
+    boxes: list[BoxRow] = Field([], description="[{ center = [x, y, z], size = [lx, ly, lz] }]")
+
+
+class JointRow(Row):
+    """[[joint]]: a screw. Limits left out are no limits."""
+
+    name: Name = Field(description="name of the joint")
+    parent: Name = Field(description="name of the link it stands on")
+    child: Name = Field(description="name of the link it carries")
+    type: JointType = Field(description='"revolute", "prismatic" or "helical"')
+    s: Unit = Field(description="unit vector [x, y, z] of its axis")
+    s0: Point = Field(description="a point [x, y, z] of its axis, in m")
+    pitch: Number = Field(None, description="advance in m/rad, for a helical joint only")
+    lower: Value = Field(-math.inf, description="lower limit in rad or m")
+    upper: Value = Field(math.inf, description="upper limit in rad or m")
+    velocity: Positive = Field(math.inf, description="greatest speed in rad/s or m/s")
+    effort: Positive = Field(math.inf, description="greatest torque or force in N m or N")
+
+
+class ClosureRow(Row):
+    """[[closure]]: two frames on two links that coincide."""
+
+    name: Name = Field(description="name of the closure")
+    link_a: Name = Field(description="name of a link")
+    frame_a: FrameRow = Field(description="{ xyz = [x, y, z], rpy = [roll, pitch, yaw] } on link_a")
+    link_b: Name = Field(description="name of another link")
+    frame_b: FrameRow = Field(description="{ xyz = [x, y, z], rpy = [roll, pitch, yaw] } on link_b")
+
+
+class LimbRow(Row):
+    """[[limb]]: a leg or an arm, and its tip."""
+
+    name: Name = Field(description="name of the limb")
+    kind: LimbKind = Field(description='"leg" or "arm"')
+    link: Name = Field(description="name of its last link")
+    tip: Name = Field(description="name of the frame at its end")
+    frame: FrameRow = Field(description="{ xyz = [x, y, z], rpy = [roll, pitch, yaw] } of the tip")
+    chain: Chain = Field(COUPLINGS, description="couplings of its virtual chain, from floor to tip")
+
+
+class MirrorRow(Row):
+    """[[limb]] with ``mirror``: another limb reflected in the xz plane, with all its rows."""
+
+    name: Name = Field(description="name of the limb")
+    mirror: Literal["y"] = Field(description='"y": the sign of y changes')
+    of: Name = Field(description="name of the limb to reflect")
+
+
+class SoleRow(Row):
+    """[[sole]]: the contact polygon of a leg."""
+
+    limb: Name = Field(description="name of a leg")
+    corners: list[Point] = Field(description="three or more points, counter-clockwise seen from above")
+
+
+class PostureRow(Row):
+    """[[posture]]: joint positions by name; joints left out are at 0."""
+
+    name: Name = Field(description="name of the posture")
+    base_height: Value | None = Field(None, description="height of the base above the floor in m")
+    q: dict[str, Value] = Field({}, description="{ joint = position, ... } in rad or m")
+
+
+ROWS: Mapping[str, type[Row]] = {
+    "link": LinkRow,
+    "joint": JointRow,
+    "closure": ClosureRow,
+    "limb": LimbRow,
+    "sole": SoleRow,
+    "posture": PostureRow,
+}
+"""Arrays of tables, by their key."""
+
+TABLES = ("robot", "parameters", *ROWS, "servos")
+"""All keys at the top of a file."""
+
+_PARTS: Mapping[str, type[Row]] = {
+    "inertia": InertiaRow,
+    "frame": FrameRow,
+    "frame_a": FrameRow,
+    "frame_b": FrameRow,
+    "boxes": BoxRow,
+}
+
+Kind = TypeVar("Kind", bound=Row)
+
+
+def label(table: str, index: int, row: object) -> str:
+    """Where a row stands: ``[[joint]] 3 'right_knee'``, counted from 1."""
+    name = row.get("limb" if table == "sole" else "name") if isinstance(row, dict) else None
+    return f"[[{table}]] {index + 1}" + (f" {name!r}" if isinstance(name, str) else "")
+
+
+def kind_of(table: str, row: object) -> type[Row]:
+    """The model of a row; a limb is a mirrored one as soon as it says so."""
+    mirrored = table == "limb" and isinstance(row, dict) and ("mirror" in row or "of" in row)
+    return MirrorRow if mirrored else ROWS[table]
+
+
+def read_row(
+    kind: type[Kind],
+    row: object,
+    where: str,
+    names: Mapping[str, Scalar],
+    numbers: Mapping[str, float],
+) -> tuple[Kind | None, list[Fault]]:
+    """One row of a table, or all its faults.
+
+    Args:
+        kind: the row's model.
+        row: what the file holds there.
+        where: the row's place, for the faults.
+        names: values of the parameters for the mechanism's numbers: floats or symbols.
+        numbers: their numeric values, for limits and postures.
+    """
+    try:
+        return kind.model_validate(row, context=(names, numbers)), []
+    except ValidationError as error:
+        told = [_fault(kind, where, dict(one)) for one in error.errors(include_url=False)]
+        return None, [fault for fault in told if fault is not None]
+
+
+def _fault(kind: type[Row], where: str, error: Mapping[str, Any]) -> Fault | None:
+    """A pydantic error in our words; None for one that is reported at its parameter."""
+    loc: Sequence[str | int] = error["loc"]
+    key = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in loc).lstrip(".")
+    context = error.get("ctx", {})
+    if error["type"] == "fault":
+        return None if context["unresolved"] else Fault(where, key, context["found"], context["fix"])
+    owner = _owner(kind, loc)
+    last = str(loc[-1]) if loc else ""
+    if error["type"] == "extra_forbidden":
+        fix = f"{near(last, owner.model_fields)}Keys: {listed(owner.model_fields)}"
+        return Fault(where, key, "is unknown", fix)
+    field = owner.model_fields.get(last)
+    meant = field.description if field else f"a table with the keys {listed(owner.model_fields)}"
+    if error["type"] == "missing":
+        return Fault(where, key, "is missing", f"Write {last} = {meant}")
+    return Fault(where, key, f"found {error['input']!r}", f"Expected {meant}")
+
+
+def _owner(kind: type[Row], loc: Sequence[str | int]) -> type[Row]:
+    """The model that holds the last key of a place."""
+    for part in loc[:-1]:
+        kind = _PARTS.get(str(part), kind)
+    return kind
