@@ -57,7 +57,9 @@ def namespace(*scalars: Scalar) -> Any:
         elif is_jax(x):
             import jax.numpy as jnp
 
-            return SimpleNamespace(sin=jnp.sin, cos=jnp.cos, sqrt=jnp.sqrt, atan2=jnp.arctan2, where=jnp.where)
+            return SimpleNamespace(
+                sin=jnp.sin, cos=jnp.cos, sqrt=jnp.sqrt, atan2=jnp.arctan2, where=jnp.where
+            )
         elif hasattr(x, "__scalar_namespace__"):
             return x.__scalar_namespace__
         else:
@@ -108,6 +110,11 @@ def times(a: Scalar, b: Scalar) -> Scalar:
     return a * b
 
 
+def over(a: Scalar, b: Scalar) -> Scalar:
+    """a / b, with a structural 0 above and 1 below folded; exact for symbols."""
+    return a if _is(a, 0) or _is(b, 1) else a / b
+
+
 def structural(x: float) -> Scalar:
     """A number read from a table as structure: exactly 0, 1 or -1 becomes a Python int."""
     return int(x) if x in (0.0, 1.0, -1.0) else x
@@ -148,9 +155,9 @@ def entire(
 ) -> Callable[[Scalar], Scalar]:
     """A removable singularity, named once: f(t2) with t2 = theta squared.
 
-    Below ``threshold`` the power series in t2 (whose omitted terms lie below machine precision there), above it
-    the closed form in theta, whose cancellation is harmless there; for symbols the closed form only. The
-    branch not taken is evaluated at a harmless argument, so its gradient is finite.
+    Below ``threshold`` the power series in t2 (whose omitted terms lie below machine precision there), above
+    it the closed form in theta, which loses few digits to cancellation there; for symbols the closed form
+    only. The branch not taken is evaluated at a harmless argument, so its gradient is finite.
     """
     series = [float(c) for c in coefficients]
 
@@ -191,7 +198,7 @@ sinc3 = entire(lambda t: (t - sin(t)) / (t * t * t), [_series(k + 1, -1) for k i
 """(theta - sin(theta))/theta^3 as a function of theta squared."""
 
 atanc = entire(
-    lambda t: atan2(t, 1.0) / t, [Fraction((-1) ** k, 2 * k + 1) for k in range(26)], threshold=0.0625
+    lambda t: atan2(t, 1) / t, [Fraction((-1) ** k, 2 * k + 1) for k in range(26)], threshold=0.0625
 )
 """atan(t)/t as a function of t squared."""
 
@@ -208,36 +215,36 @@ def _derivative_series() -> tuple[list[Fraction], ...]:
 
 
 _F1, _F2, _F3, _F4 = _derivative_series()
-dexp1 = entire(lambda t: (4 - t * sin(t) - 4 * cos(t)) / (2 * t**2), _F1)
-dexp2 = entire(lambda t: (4 * t - 5 * sin(t) + t * cos(t)) / (2 * t**3), _F2)
-dexp3 = entire(lambda t: (2 - t * sin(t) - 2 * cos(t)) / (2 * t**4), _F3)
-dexp4 = entire(lambda t: (2 * t - 3 * sin(t) + t * cos(t)) / (2 * t**5), _F4)
+dexp1 = entire(lambda t: (4 - t * sin(t) - 4 * cos(t)) / (2 * t**2), _F1, threshold=4.0)
+dexp2 = entire(lambda t: (4 * t - 5 * sin(t) + t * cos(t)) / (2 * t**3), _F2, threshold=4.0)
+dexp3 = entire(lambda t: (2 - t * sin(t) - 2 * cos(t)) / (2 * t**4), _F3, threshold=4.0)
+dexp4 = entire(lambda t: (2 * t - 3 * sin(t) + t * cos(t)) / (2 * t**5), _F4, threshold=9.0)
 
 
-def _bernoulli(n: int) -> list[Fraction]:
-    """Bernoulli numbers B_0 .. B_n."""
-    numbers: list[Fraction] = []
-    for m in range(n + 1):
-        total = sum((math.comb(m + 1, k) * b for k, b in enumerate(numbers)), Fraction(0))
-        numbers.append(Fraction(1) if m == 0 else -total / (m + 1))
-    return numbers
+def _even_bernoulli(count: int) -> list[Fraction]:
+    """Bernoulli numbers B_0, B_2, B_4 and so on."""
+    even = [Fraction(1)]
+    for m in range(2, 2 * count, 2):
+        known = sum((math.comb(m + 1, 2 * k) * b for k, b in enumerate(even)), Fraction(-(m + 1), 2))
+        even.append(-known / (m + 1))
+    return even
 
 
-def _inverse_series(terms: int = 20) -> tuple[list[Fraction], list[Fraction]]:
+_B = _even_bernoulli(34)
+
+
+def _inverse_series(terms: int = 32) -> tuple[list[Fraction], list[Fraction]]:
     """Coefficients of the two entire functions of ``se3.dlog``.
 
-    The operator series is sum B_n ad^n / n!. On se(3) ad (ad^2 + theta^2)^2 = 0, hence for the even powers
-    ad^(2m+2) = (-1)^m theta^(2m-2) ((m + 1 - 1) ... ) reduce to ad^2 and ad^4:
-    ad^(2k) = (-t2)^(k-2) ((k - 1) ad^4 + (k - 2) t2 ad^2) for k >= 1.
+    The operator series is sum B_n ad^n / n!. On se(3) ad (ad^2 + theta^2)^2 = 0, so the even powers reduce to
+    ad^2 and ad^4: ad^(2k) = (-t2)^(k-2) ((k - 1) ad^4 + (k - 2) t2 ad^2) for k >= 1.
     """
-    bernoulli = _bernoulli(2 * terms + 4)
     g2, g4 = [Fraction(0)] * (terms + 2), [Fraction(0)] * (terms + 2)
     for k in range(1, terms + 2):
-        b = bernoulli[2 * k] / math.factorial(2 * k)
-        sign = (-1) ** k
-        g2[k - 1] += b * sign * (k - 2)
+        b = (-1) ** k * _B[k] / math.factorial(2 * k)
+        g2[k - 1] += b * (k - 2)
         if k >= 2:
-            g4[k - 2] += b * sign * (k - 1)
+            g4[k - 2] += b * (k - 1)
     return g2[:terms], g4[:terms]
 
 
@@ -245,9 +252,10 @@ _G2, _G4 = _inverse_series()
 
 vlog = entire(
     lambda t: (1 - t * sin(t) / (2 * (1 - cos(t)))) / (t * t),
-    [b * (-1) ** (k + 1) / math.factorial(2 * k) for k, b in enumerate(_bernoulli(40)[::2]) if k >= 1],
+    [(-1) ** (k + 1) * _B[k] / math.factorial(2 * k) for k in range(1, 21)],
+    threshold=4.0,
 )
 """(1 - (theta/2) cot(theta/2))/theta^2 as a function of theta squared: the inverse of so(3)'s V."""
 
-dlog2 = entire(lambda t: 2 / t**2 + (t + 3 * sin(t)) / (4 * t * (cos(t) - 1)), _G2)
-dlog4 = entire(lambda t: 1 / t**4 + (t + sin(t)) / (4 * t**3 * (cos(t) - 1)), _G4)
+dlog2 = entire(lambda t: 2 / t**2 + (t + 3 * sin(t)) / (4 * t * (cos(t) - 1)), _G2, threshold=10.0)
+dlog4 = entire(lambda t: 1 / t**4 + (t + sin(t)) / (4 * t**3 * (cos(t) - 1)), _G4, threshold=10.0)

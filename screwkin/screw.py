@@ -2,14 +2,17 @@
 
 A screw is a line with a pitch: axis ``s`` through ``s0``. A revolute joint has pitch 0, a helical one a
 pitch in m/rad, a prismatic one the pitch ``INFINITE`` (its line's position then does not matter).
+Equations are those of paper A in docs/papers.md.
 """
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
-from screwkin.scalar import Scalar, plus, times
-from screwkin.se3 import UNTURNED, Pose, Rotation, Twist, Vector, cross, dot, record, rotate
+from screwkin.errors import InputError
+from screwkin.scalar import Scalar, over, plus, sqrt, times
+from screwkin.se3 import UNTURNED, ZERO, Pose, Rotation, Twist, Vector, cross, dot, record, rotate
 
 INFINITE = math.inf
 """Pitch of a pure translation."""
@@ -30,10 +33,19 @@ class Screw:
 
     @property
     def twist(self) -> Twist:
-        """Normalised screw (Bioloid paper, eq. 4): [s; s0 x s + h s], or [0; s] for a translation."""
+        """Normalised screw (paper A, eq. 4): [s; s0 x s + h s], or [0; s] for a translation."""
         if self.is_translation:
-            return Twist(Vector(0, 0, 0), self.s)
+            return Twist(ZERO, self.s)
         return Twist(self.s, cross(self.s0, self.s) + self.s * self.pitch)
+
+    def flattened(self) -> tuple[tuple[Any, ...], Scalar]:
+        """Leaves and static part for JAX: an infinite pitch is the joint's kind, not a number."""
+        return ((self.s, self.s0), INFINITE) if self.is_translation else ((self.s, self.s0, self.pitch), None)
+
+    @classmethod
+    def unflattened(cls, pitch: Scalar, leaves: tuple[Any, ...]) -> Screw:
+        """The screw of such leaves and static part."""
+        return cls(*leaves) if pitch is None else cls(*leaves, pitch)
 
 
 @record
@@ -59,7 +71,7 @@ class Wrench:
 
 
 def displacement(screw: Screw, theta: Scalar) -> Pose:
-    """Screw displacement (Bioloid paper, eq. 1-2): points of the axis only advance, by pitch * theta.
+    """Screw displacement (paper A, eq. 1-2): points of the axis only advance, by pitch * theta.
 
     theta is an angle [rad], for a translation the distance [m].
     """
@@ -112,9 +124,19 @@ def reciprocal_product(a: Twist, b: Twist) -> Scalar:
 
 
 def screw_from_twist(twist: Twist) -> tuple[Screw, Scalar]:
-    """Axis, pitch and magnitude of a twist that turns (omega not 0): Poinsot's decomposition."""
+    """Axis, pitch and magnitude of a twist: Poinsot's decomposition.
+
+    A twist of numbers without rotation gives infinite pitch; in a batch or in symbols every twist must turn.
+
+    Raises:
+        InputError: the twist is zero, so that it has no axis.
+    """
     squared = dot(twist.omega, twist.omega)
-    rate = squared**0.5
-    pitch = dot(twist.omega, twist.v) / squared
-    s0 = cross(twist.omega, twist.v) * (1 / squared)
-    return Screw(twist.omega * (1 / rate), s0, pitch), rate
+    if isinstance(squared, int | float) and squared == 0:
+        speed = sqrt(dot(twist.v, twist.v))
+        if isinstance(speed, int | float) and speed == 0:
+            raise InputError("the zero twist has no screw axis")
+        return Screw(twist.v / speed, ZERO, INFINITE), speed
+    rate = sqrt(squared)
+    pitch = over(dot(twist.omega, twist.v), squared)
+    return Screw(twist.omega / rate, cross(twist.omega, twist.v) / squared, pitch), rate

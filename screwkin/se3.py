@@ -13,7 +13,7 @@ from typing import Any, TypeVar, dataclass_transform
 import numpy as np
 
 from screwkin import scalar
-from screwkin.scalar import Scalar, dense, is_jax, is_symbolic, minus, plus, times
+from screwkin.scalar import Scalar, dense, is_jax, is_symbolic, minus, over, plus, times
 
 R = TypeVar("R")
 _RECORDS: list[type] = []
@@ -24,20 +24,26 @@ _registered_with_jax: set[type] = set()
 def record(cls: type[R]) -> type[R]:
     """A frozen dataclass that NumPy leaves alone in operators and that JAX can learn about."""
     made = dataclass(frozen=True, eq=False)(cls)
-    made.__array_ufunc__ = None  # type: ignore[attr-defined]
+    made.__array_ufunc__ = None
     _RECORDS.append(made)
     return made
 
 
 def register_with_jax() -> None:
-    """Make every record a JAX pytree, so that records may cross ``jit`` and ``vmap`` boundaries."""
+    """Make every record a JAX pytree, so that records may cross ``jit`` and ``vmap`` boundaries.
+
+    All components are leaves, structural 0 and 1 too. A record with static parts says how it is flattened.
+    """
     import jax
 
     for cls in _RECORDS:
         if cls not in _registered_with_jax:
             _registered_with_jax.add(cls)
-            names = [f.name for f in fields(cls)]  # type: ignore[arg-type]
-            jax.tree_util.register_dataclass(cls, data_fields=names, meta_fields=[])
+            if hasattr(cls, "flattened"):
+                jax.tree_util.register_pytree_node(cls, cls.flattened, cls.unflattened)
+            else:
+                names = [f.name for f in fields(cls)]  # type: ignore[arg-type]
+                jax.tree_util.register_dataclass(cls, data_fields=names, meta_fields=[])
 
 
 def leaves(value: Any) -> list[Scalar]:
@@ -83,6 +89,9 @@ class Vector:
         return Vector(times(self.x, factor), times(self.y, factor), times(self.z, factor))
 
     __rmul__ = __mul__
+
+    def __truediv__(self, divisor: Scalar) -> Vector:
+        return Vector(over(self.x, divisor), over(self.y, divisor), over(self.z, divisor))
 
 
 ZERO = Vector(0, 0, 0)
@@ -173,6 +182,9 @@ class Twist:
         return Twist(self.omega * factor, self.v * factor)
 
     __rmul__ = __mul__
+
+    def __truediv__(self, divisor: Scalar) -> Twist:
+        return Twist(self.omega / divisor, self.v / divisor)
 
 
 NO_TWIST = Twist(ZERO, ZERO)
@@ -270,7 +282,7 @@ def log(pose: Pose) -> Twist:
     t2 = dot(w, w)
     # V^-1 p with V = 1 + cosc [w] + sinc3 [w]^2; the coefficient of [w]^2 is (1 - sinc / (2 cosc)) / t2.
     once = cross(w, pose.p)
-    return Twist(w, pose.p - once * 0.5 + cross(w, once) * scalar.vlog(t2))
+    return Twist(w, pose.p - once / 2 + cross(w, once) * scalar.vlog(t2))
 
 
 def dexp(twist: Twist, rate: Twist) -> Twist:
@@ -289,7 +301,7 @@ def dlog(twist: Twist, spatial: Twist) -> Twist:
     first = bracket(twist, spatial)
     second = bracket(twist, first)
     fourth = bracket(twist, bracket(twist, second))
-    return spatial - first * 0.5 + second * scalar.dlog2(t2) + fourth * scalar.dlog4(t2)
+    return spatial - first / 2 + second * scalar.dlog2(t2) + fourth * scalar.dlog4(t2)
 
 
 def unstack(array: Any, axis: int = -1) -> list[Scalar]:
