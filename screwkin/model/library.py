@@ -57,6 +57,13 @@ def _find(what: str, kind: str, name_or_path: str | Path) -> Path:
     if name in valid:
         return data_folder(kind) / f"{name}.toml"
     looks_like_path = isinstance(name_or_path, Path) or name.endswith(".toml") or "/" in name or "\\" in name
-    if looks_like_path and "\0" not in name and Path(name).exists():
+    if looks_like_path and _exists(Path(name)):
         return Path(name)
     raise UnknownNameError(f"{what} file" if looks_like_path else what, name, valid)
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists()
+    except (OSError, ValueError):  # forbidden folders, names too long or with a null byte
+        return False

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from screwkin.errors import Fault, TableError
+from screwkin.errors import Fault
 from screwkin.model.expression import listed, near
 from screwkin.model.schema import ROWS, TABLES, RobotRow, Row, kind_of, label, read_row
 from screwkin.scalar import Scalar
@@ -41,20 +40,6 @@ class Rows:
     def good(self, table: str) -> Iterator[tuple[str, Any]]:
         """Place and row, for the rows without faults."""
         return ((entry.where, entry.row) for entry in self.entries[table] if entry.row is not None)
-
-
-def read_toml(text: str, path: str) -> dict[str, Any]:
-    """A TOML text as nested dictionaries.
-
-    Raises:
-        TableError: the text is not TOML; the fault names the line.
-    """
-    fix = "Mend the TOML there: quote texts, close brackets and quotes, write each key once"
-    try:
-        return tomllib.loads(text)
-    except (ValueError, RecursionError) as error:  # ValueError also for integers of thousands of digits
-        found, _, place = str(error).partition(" (at ")
-        raise TableError(path, [Fault(place.rstrip(")") or "file", "", found, fix)]) from None
 
 
 def read_rows(

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from screwkin.errors import Fault
 from screwkin.model.expression import listed, near
@@ -27,10 +28,19 @@ class Mirrored:
     part: tuple[str, ...]
 
 
+class Named(NamedTuple):
+    """A name, what bears it, and where the file says so."""
+
+    kind: str
+    name: str
+    where: str
+    key: str
+
+
 def structure_faults(rows: Rows, mirrored: Iterable[Mirrored]) -> Iterator[Fault]:
     """All faults of names and connections, mirrored rows included."""
     named = list(_all_names(rows, list(mirrored)))
-    yield from _duplicates(named)
+    yield from _duplicates(named, rows.robot.text("base_link"))
     yield from _unknown(rows, named)
     yield from _tree_faults(rows)
     yield from _sole_faults(rows, named)
@@ -88,31 +98,31 @@ def _sideless(rows: Rows, entry: Entry, source: Entry, part: tuple[str, ...]) ->
                 yield Fault(entry.where, "of", f"{what} {name!r} is mirrored but names no side", fix)
 
 
-def _all_names(rows: Rows, mirrored: list[Mirrored]) -> Iterator[tuple[str, str, str, str]]:
-    """(kind, name, place, key) of everything that has a name, mirrored things included."""
+def _all_names(rows: Rows, mirrored: list[Mirrored]) -> Iterator[Named]:
+    """Everything that has a name, mirrored things included."""
     for table in ("link", "joint", "closure", "limb", "posture"):
         for entry in rows[table]:
             if entry.text("name"):
-                yield table, entry.text("name"), entry.where, "name"
+                yield Named(table, entry.text("name"), entry.where, "name")
     tips = {entry.text("name"): entry.text("tip") for entry in rows["limb"] if entry.text("tip")}
     for entry in rows["limb"]:
         if entry.text("tip"):
-            yield "tip", entry.text("tip"), entry.where, "tip"
+            yield Named("tip", entry.text("tip"), entry.where, "tip")
     for limb in mirrored:
-        yield from (("link", swapped(name), limb.where, "of") for name in limb.part)
+        yield from (Named("link", swapped(name), limb.where, "of") for name in limb.part)
         for entry in rows["joint"]:
             if entry.text("child") in limb.part and entry.text("name"):
-                yield "joint", swapped(entry.text("name")), limb.where, "of"
+                yield Named("joint", swapped(entry.text("name")), limb.where, "of")
         for entry in rows["closure"]:
             if closes_within(entry.text("link_a"), entry.text("link_b"), limb.part):
-                yield "closure", swapped(entry.text("name")), limb.where, "of"
+                yield Named("closure", swapped(entry.text("name")), limb.where, "of")
         if limb.of in tips:
-            yield "tip", swapped(tips[limb.of]), limb.where, "of"
+            yield Named("tip", swapped(tips[limb.of]), limb.where, "of")
 
 
-def names_of(kind: str, named: Iterable[tuple[str, str, str, str]]) -> list[str]:
+def names_of(kind: str, named: Iterable[Named]) -> list[str]:
     """All names of one kind."""
-    return [name for what, name, _, _ in named if what == kind]
+    return [one.name for one in named if one.kind == kind]
 
 
 def joint_names(rows: Rows, mirrored: list[Mirrored]) -> list[str]:
@@ -120,7 +130,7 @@ def joint_names(rows: Rows, mirrored: list[Mirrored]) -> list[str]:
     return names_of("joint", _all_names(rows, mirrored))
 
 
-def _duplicates(named: list[tuple[str, str, str, str]]) -> Iterator[Fault]:
+def _duplicates(named: list[Named], base: str) -> Iterator[Fault]:
     first: dict[tuple[str, str], str] = {}
     links = names_of("link", named)
     for kind, name, where, key in named:
@@ -128,13 +138,16 @@ def _duplicates(named: list[tuple[str, str, str, str]]) -> Iterator[Fault]:
             found = f"there is a {kind} {name!r} already, at {first[kind, name]}"
             yield Fault(where, key, found, f"Give each {kind} a name of its own")
         first.setdefault((kind, name), where)
+        if kind == "link" and name == "base" and name != base:
+            fix = 'Rename it: frame "base" is the base link\'s'
+            yield Fault(where, key, "link 'base' is not base_link", fix)
         if kind == "tip" and name in links:
             yield Fault(where, key, f"tip {name!r} bears the name of a link", "Rename the tip or the link")
         if kind == "tip" and name in RESERVED:
             yield Fault(where, key, f"tip {name!r} is a reserved name", f"Not allowed: {listed(RESERVED)}")
 
 
-def _unknown(rows: Rows, named: list[tuple[str, str, str, str]]) -> Iterator[Fault]:
+def _unknown(rows: Rows, named: list[Named]) -> Iterator[Fault]:
     """Names that are used but not declared."""
     links = names_of("link", named)
     uses = {"joint": ("parent", "child"), "closure": ("link_a", "link_b"), "limb": ("link",)}
@@ -182,7 +195,7 @@ def _unreached(links: dict[str, Entry], by: dict[str, Entry], base: str) -> Iter
             yield Fault(by[circle[0]].where, "parent", found, f"Hang one of them on {base!r} or its children")
 
 
-def _sole_faults(rows: Rows, named: list[tuple[str, str, str, str]]) -> Iterator[Fault]:
+def _sole_faults(rows: Rows, named: list[Named]) -> Iterator[Fault]:
     limbs, seen = names_of("limb", named), dict[str, str]()
     source = {entry.text("name"): entry.text("of") or entry.text("name") for entry in rows["limb"]}
     kinds = {entry.text("name"): entry.text("kind") for entry in rows["limb"]}

@@ -13,8 +13,9 @@ from screwkin.model.expression import listed, near, resolve_parameters
 from screwkin.model.library import find_robot
 from screwkin.model.mirror import turns_around
 from screwkin.model.robot import Joint, Robot
-from screwkin.model.rows import Rows, parameters_of, read_rows, read_toml
+from screwkin.model.rows import Rows, parameters_of, read_rows
 from screwkin.model.structure import joint_names, mirrored_limbs, structure_faults
+from screwkin.model.toml import read_text, read_toml
 from screwkin.scalar import Scalar
 
 
@@ -30,26 +31,14 @@ def load_robot(name_or_path: str | Path, symbolic: bool = False) -> Robot:
         TableError: the file cannot be read or has faults; it lists all of them.
     """
     path = find_robot(name_or_path)
-    try:
-        text = path.read_bytes().decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = error.object[: error.start].count(b"\n") + 1
-        found = f"byte {error.object[error.start]:#04x} is not UTF-8"
-        raise TableError(str(path), [Fault(f"line {line}", "", found, "Save the file as UTF-8")]) from None
-    except IsADirectoryError:
-        fix = "Give the path of a table, NAME.toml"
-        raise TableError(str(path), [Fault("file", "", "is a folder", fix)]) from None
-    except OSError as error:
-        found = f"cannot be read: {error.strerror}"
-        raise TableError(str(path), [Fault("file", "", found, "Check its permissions")]) from None
-    return parse_robot(text, str(path), symbolic)
+    return parse_robot(read_text(path, TableError), str(path), symbolic)
 
 
 def parse_robot(text: str, path: str = "<text>", symbolic: bool = False) -> Robot:
     """The robot of a table's text.
 
     Args:
-        text: TOML, as ``docs/tables.md`` describes.
+        text: TOML; the comments of the bundled tables explain its keys.
         path: where it comes from, for messages and for ``Robot.path``.
         symbolic: keep the table's parameters as real sympy symbols of the same names wherever they are used
             in screws, frames, masses, inertias, boxes and soles; limits and postures stay numbers.
@@ -57,7 +46,7 @@ def parse_robot(text: str, path: str = "<text>", symbolic: bool = False) -> Robo
     Raises:
         TableError: the text has faults; it lists all of them.
     """
-    data = read_toml(text, path)
+    data = read_toml(text, path, TableError)
     numbers, faults = resolve_parameters(parameters_of(data))
     rows, more = read_rows(data, numbers, numbers)
     mirrored, wrong = mirrored_limbs(rows)

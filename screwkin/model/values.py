@@ -1,0 +1,122 @@
+"""Values of a table's keys as they are read: numbers, vectors, axes, names, virtual chains.
+
+Arithmetic is evaluated on the way, over the names that come as the validation's context: first those for the
+mechanism's numbers (floats or symbols), then their numeric values, for limits and postures.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from typing import Annotated
+
+from pydantic import PlainValidator, ValidationInfo
+from pydantic_core import PydanticCustomError
+
+from screwkin.model.expression import ExpressionError, UnresolvedError, evaluate, listed
+from screwkin.scalar import Scalar, is_symbolic, structural
+from screwkin.se3 import Vector
+
+UNIT_TOLERANCE = 1e-9
+"""How far from 1 the length of an axis may be: what nine written digits cannot miss."""
+
+COUPLINGS = ("px", "py", "pz", "rx", "ry", "rz")
+"""Couplings of a virtual chain: translations along and rotations about x, y, z."""
+
+_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
+
+
+def _wrong(found: str, fix: str, unresolved: bool = False) -> PydanticCustomError:
+    """A fault on its way through pydantic; an unresolved one is reported at its parameter instead."""
+    return PydanticCustomError("fault", "fault", {"found": found, "fix": fix, "unresolved": unresolved})
+
+
+def _number(value: object, info: ValidationInfo) -> Scalar:
+    """A number of the mechanism; exactly 0, 1 or -1 becomes structure."""
+    names, _ = info.context or ({}, {})
+    return _evaluated(value, names)
+
+
+def _value(value: object, info: ValidationInfo) -> float:
+    """A number that stays a number in the symbolic twin: limits and postures."""
+    _, numbers = info.context or ({}, {})
+    return float(_evaluated(value, numbers))
+
+
+def _evaluated(value: object, names: Mapping[str, Scalar]) -> Scalar:
+    try:
+        result = evaluate(value, names)
+    except UnresolvedError as error:
+        raise _wrong(error.found, error.fix, unresolved=True) from None
+    except ExpressionError as error:
+        raise _wrong(error.found, error.fix) from None
+    return result if is_symbolic(result) else structural(result)
+
+
+def _vector(value: object, info: ValidationInfo) -> Vector:
+    if not isinstance(value, list) or len(value) != 3:
+        raise _wrong(f"{value!r} is no vector", "Write three numbers, as [x, y, z]")
+    return Vector(*(_number(component, info) for component in value))
+
+
+def _unit(value: object, info: ValidationInfo) -> Vector:
+    axis = _vector(value, info)
+    if any(is_symbolic(c) for c in axis):
+        return axis  # its numeric twin has been checked
+    length = math.hypot(*axis)
+    if length == 0:
+        raise _wrong("s is the zero vector", "Write the unit vector of the joint's axis")
+    if abs(length - 1) > UNIT_TOLERANCE:
+        normalised = ", ".join(f"{c / length:.10g}" for c in axis)
+        told = ", ".join(f"{c:g}" for c in axis)
+        raise _wrong(f"({told}) has norm {length:.10g}, expected 1", f"Write s = [{normalised}]")
+    return axis
+
+
+def _positive_vector(value: object, info: ValidationInfo) -> Vector:
+    size = _vector(value, info)
+    if any(not is_symbolic(c) and c <= 0 for c in size):
+        raise _wrong(f"edges {value!r}", "Write three positive lengths, as [lx, ly, lz]")
+    return size
+
+
+def _mass(value: object, info: ValidationInfo) -> Scalar:
+    mass = _number(value, info)
+    if not is_symbolic(mass) and mass < 0:
+        raise _wrong(f"mass {mass:g} is negative", "Write a mass >= 0 in kg")
+    return mass
+
+
+def _positive(value: object, info: ValidationInfo) -> float:
+    number = _value(value, info)
+    if number <= 0:
+        raise _wrong(f"{number:g} is not positive", "Write a positive number, or leave it out for no limit")
+    return number
+
+
+def _name(value: object) -> str:
+    if not isinstance(value, str) or not _NAME.fullmatch(value):
+        fix = "Write letters, digits, _ and -, beginning with a letter"
+        raise _wrong(f"{value!r} is not a name", fix)
+    return value
+
+
+def _chain(value: object) -> tuple[str, ...]:
+    whole = listed(COUPLINGS)
+    if not isinstance(value, list) or not value or any(c not in COUPLINGS for c in value):
+        raise _wrong(f"{value!r} is no virtual chain", f"List couplings from floor to tip, out of {whole}")
+    if len(set(value)) < len(value):
+        raise _wrong(f"{value!r} has a coupling twice", f"List each of {whole} at most once")
+    return tuple(value)
+
+
+Name = Annotated[str, PlainValidator(_name)]
+Number = Annotated[Scalar, PlainValidator(_number)]
+Mass = Annotated[Scalar, PlainValidator(_mass)]
+Value = Annotated[float, PlainValidator(_value)]
+Positive = Annotated[float, PlainValidator(_positive)]
+Point = Annotated[Vector, PlainValidator(_vector)]
+Unit = Annotated[Vector, PlainValidator(_unit)]
+Size = Annotated[Vector, PlainValidator(_positive_vector)]
+Chain = Annotated[tuple[str, ...], PlainValidator(_chain)]
