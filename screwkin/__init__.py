@@ -10,6 +10,10 @@ _HOMES = {
         "home link_poses frame_pose jacobian center_of_mass com_jacobian momentum mass_matrix"
         " inverse_dynamics ground_wrench"
     ),
+    "screwkin.gait.balance": "zmp",
+    "screwkin.gait.files": "load_gait",
+    "screwkin.gait.walk": "walk",
+    "screwkin.trajectory": "Trajectory load_trajectory",
     "screwkin.api.mechanism": "network_matrix virtual_motion secondary_rates solve_pose",
     "screwkin.mechanism.choice": "closed_mechanism",
     "screwkin.model.robot": "Robot",

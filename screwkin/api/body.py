@@ -139,7 +139,7 @@ def inverse_dynamics(
     qdd: Any,
     base_twist: Any = None,
     base_acceleration: Any = None,
-    gravity: float = 9.81,
+    gravity: float = newton_euler.GRAVITY,
 ) -> Array:
     """Generalised force (..., 6+n): wrench [m; f] on the base about its origin (world axes), joint torques.
 
@@ -171,7 +171,7 @@ def ground_wrench(
     qdd: Any,
     base_twist: Any,
     base_acceleration: Any,
-    gravity: float = 9.81,
+    gravity: float = newton_euler.GRAVITY,
 ) -> Array:
     """Wrench (..., 6) that the ground must give, [m; f] about the world origin, world axes."""
     T, q, batch = parts(robot, state)

@@ -10,7 +10,6 @@ import numpy as np
 from screwkin.api.arrays import Array, checked, parts, twist_of
 from screwkin.api.body import home
 from screwkin.errors import InputError, SingularError, UnknownNameError
-from screwkin.kinematics import positions
 from screwkin.mechanism import network
 from screwkin.mechanism import virtual_motion as virtual
 from screwkin.mechanism.mechanism import Mechanism
@@ -42,7 +41,7 @@ def network_matrix(mechanism: Mechanism, state: State, point: Any = None) -> Arr
 
 
 def virtual_motion(
-    mechanism: Mechanism, state: State, base_twist: Any, tip_twists: Mapping[str, Any], rate: Any = None
+    mechanism: Mechanism, state: State, base_twist: Any, tip_twists: Mapping[str, Any]
 ) -> Array:
     """Rates (..., primary) of the primary virtual couplings that give base and tips their twists.
 
@@ -52,52 +51,34 @@ def virtual_motion(
         base_twist: [omega; v of the base origin] (..., 6), world axes; ignored with a fixed base.
         tip_twists: for every tip with primary couplings: [omega; v of the tip origin] (..., 6), or v alone
             (..., 3) where only translations are primary.
-        rate: for second derivatives, the same as ``(base_acceleration, tip_accelerations)``: the result then
-            holds the couplings' accelerations.
 
     Raises:
-        InputError: a real joint is primary, or a tip's twist is missing.
+        InputError: a real joint is primary, or a tip's twist is missing or lacks a rotation.
 
     Source: Bioloid paper, eq. 7.
     """
     T, q, batch = parts(mechanism.robot, state)
-    D = positions.link_displacements(mechanism.robot, q)
-    motion: dict[str, Any] = {}
-    for chain in mechanism.chains:
+    twists: dict[str, Twist] = {}
+    chains = virtual.imposing_chains(mechanism)
+    for chain in chains:
         wanted = [name for name in chain.names if name in mechanism.primary]
-        if not wanted:
-            continue
         given = base_twist if chain.limb is None else tip_twists.get(chain.name)
         if given is None:
-            raise InputError(
-                f"tip_twists lacks {chain.name}, whose couplings {', '.join(wanted)} are primary"
-            )
-        twist, turns = _body_twist(chain.name, given)
-        if not turns and any(name.split(".")[1][0] == "r" for name in wanted):
-            raise InputError(
-                f"tip_twists[{chain.name!r}] has 3 components, but rotations of its chain are primary"
-            )
-        R = T.R if chain.limb is None else (T @ positions.frame_pose(mechanism.robot, D, chain.name)).R
-        if rate is None:
-            rates = virtual.chain_rates(chain.couplings, R, twist.omega, twist.v)
+            raise InputError(f"tip_twists lacks {chain.name}, but {', '.join(wanted)} are primary")
+        if np.shape(given)[-1:] == (3,):
+            if any(name.split(".")[1][0] == "r" for name in wanted):
+                raise InputError(f"the twist of {chain.name} has 3 components, but its rotations are primary")
+            twists[chain.name] = Twist(ZERO, vector_from_array(checked(chain.name, given, 3)))
         else:
-            second, _ = _body_twist(chain.name, rate[0] if chain.limb is None else rate[1][chain.name])
-            rates = virtual.chain_accelerations(chain.couplings, R, twist.omega, second.omega, second.v)
-        motion |= dict(zip(chain.names, rates, strict=True))
-    real = [name for name in mechanism.primary if name not in motion]
+            twists[chain.name] = twist_of(chain.name, given)
+    virtually = {name for chain in chains for name in chain.names}
+    real = [name for name in mechanism.primary if name not in virtually]
     if real:
         raise InputError(
             f"primary couplings {', '.join(real)} belong to no virtual chain; give their rates directly"
         )
+    motion = virtual.primary_motion(mechanism, T, q, twists)
     return as_array([motion[name] for name in mechanism.primary], batch)
-
-
-def _body_twist(name: str, value: Any) -> tuple[Twist, bool]:
-    """A twist from (..., 6) or (..., 3), and whether it tells rotation."""
-    turns = np.shape(value)[-1:] != (3,)
-    if turns:
-        return twist_of(name, value), True
-    return Twist(ZERO, vector_from_array(checked(name, value, 3))), False
 
 
 def secondary_rates(

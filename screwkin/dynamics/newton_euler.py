@@ -16,6 +16,9 @@ from screwkin.scalar import Scalar
 from screwkin.screw import Wrench, at, power
 from screwkin.se3 import ZERO, Pose, Rotation, Twist, Vector, X, Y, Z, bracket, cross, dot
 
+GRAVITY = 9.81
+"""Acceleration of free fall [m/s^2], along -z."""
+
 NO_WRENCH = Wrench(ZERO, ZERO)
 
 

@@ -26,7 +26,7 @@ def convex_hull(points: Array) -> Array:
 
 
 def signed_margin(points: Array, polygon: Array) -> Array:
-    """Distance (T,) of points (T, 2) from a convex polygon's border [m]: positive inside, negative outside."""
+    """Distance (T,) of points (T, 2) from a convex polygon's border [m], negative outside."""
     start = polygon
     edge = np.roll(polygon, -1, axis=0) - start
     length = np.linalg.norm(edge, axis=1)

@@ -147,8 +147,8 @@ def _check(mechanism: Mechanism, N: Array) -> None:
         )
     if have < needed:
         raise InputError(
-            f"{have} secondary couplings but N has rank {needed}: {needed - have} too few, the circuits could "
-            f"not close; make secondary: {', '.join(missing[: needed - have])}"
+            f"{have} secondary couplings but N has rank {needed}: {needed - have} too few, the circuits "
+            f"could not close; make secondary: {', '.join(missing[: needed - have])}"
         )
     if surplus:
         raise SingularError(

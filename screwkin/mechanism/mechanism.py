@@ -130,7 +130,7 @@ class Mechanism:
 
     @cached_property
     def blocks(self) -> list[tuple[list[int], list[int]]]:
-        """Independent systems into which the secondary rates fall apart: (circuits, indices in ``secondary``)."""
+        """Independent systems of secondary rates: (circuits, indices in ``secondary``)."""
         return graphs.components(self.circuit_matrix[:, self.secondary_columns])
 
     @cached_property

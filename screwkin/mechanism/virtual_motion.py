@@ -5,11 +5,13 @@ Source: Bioloid paper, eq. 7. Translations follow the body's own origin, rotatio
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
+from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.mechanism.chains import AXES, chain_coordinates, rotations
+from screwkin.mechanism.mechanism import Mechanism, VirtualChain
 from screwkin.scalar import Scalar
-from screwkin.se3 import UNTURNED, ZERO, Pose, Rotation, Vector, cross, dot, rotate
+from screwkin.se3 import UNTURNED, ZERO, Pose, Rotation, Twist, Vector, cross, dot, rotate
 
 
 def _axes(chain: Sequence[str], R: Rotation) -> list[Vector]:
@@ -50,3 +52,39 @@ def chain_accelerations(
     turning = dict(zip(rotations(chain), _shares(directions, alpha - bias), strict=True))
     moving = dict(zip("xyz", a, strict=True))
     return [(moving if c[0] == "p" else turning)[c[1]] for c in chain]
+
+
+def imposing_chains(mechanism: Mechanism) -> list[VirtualChain]:
+    """The virtual chains with a primary coupling: those whose bodies' motion must be given."""
+    return [chain for chain in mechanism.chains if any(name in mechanism.primary for name in chain.names)]
+
+
+def primary_motion(
+    mechanism: Mechanism,
+    T: Pose,
+    q: Sequence[Scalar],
+    twists: Mapping[str, Twist],
+    accelerations: Mapping[str, Twist] | None = None,
+) -> dict[str, Scalar]:
+    """Rates of the imposing chains' couplings, or with ``accelerations`` their second derivatives.
+
+    Args:
+        mechanism: its primary couplings belong to virtual chains.
+        T: pose of the base in the world.
+        q: joint positions in table order.
+        twists: by chain name, [omega; v] of its body at the body's own origin, world axes. Where only
+            translations are primary, omega does not matter.
+        accelerations: by chain name, the twists' time derivatives.
+    """
+    D = link_displacements(mechanism.robot, q)
+    motion: dict[str, Scalar] = {}
+    for chain in imposing_chains(mechanism):
+        R = T.R if chain.limb is None else T.R @ frame_pose(mechanism.robot, D, chain.name).R
+        twist = twists[chain.name]
+        if accelerations is None:
+            values = chain_rates(chain.couplings, R, twist.omega, twist.v)
+        else:
+            second = accelerations[chain.name]
+            values = chain_accelerations(chain.couplings, R, twist.omega, second.omega, second.v)
+        motion |= dict(zip(chain.names, values, strict=True))
+    return motion

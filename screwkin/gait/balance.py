@@ -1,0 +1,130 @@
+"""The balance of a motion: CoM, ground wrench, ZMP and its margin, from the dynamics of all links."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from screwkin.dynamics.newton_euler import GRAVITY, Bodies, ground_wrench
+from screwkin.dynamics.support import Spike, spikes, support_margin
+from screwkin.dynamics.zmp import cart_table_zmp, zmp_from_wrench
+from screwkin.errors import InputError
+from screwkin.kinematics.mass import center_of_mass
+from screwkin.kinematics.positions import link_displacements
+from screwkin.model.robot import Robot
+from screwkin.screw import wrench_at
+from screwkin.se3 import Twist, Vector, as_array, pose_from_array, twist_from_array, unstack
+from screwkin.trajectory import Trajectory
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+
+@dataclass(frozen=True, eq=False)
+class Balance:
+    """ZMP and what belongs to it, over T samples.
+
+    Attributes:
+        zmp: (T, 2) from the multibody ground wrench [m].
+        com: (T, 3) [m].
+        wrench: (T, 6), the ground's [m; f] about the world origin [N m, N].
+        margin: (T,) distance of the ZMP inside the support polygon, negative outside [m].
+        spikes: local maxima of |GCoM - ZMP| above twice its median.
+        cart_table: (T, 2) ZMP of a point mass at the CoM, for comparison [m].
+    """
+
+    zmp: Array
+    com: Array
+    wrench: Array
+    margin: Array
+    spikes: tuple[Spike, ...]
+    cart_table: Array
+
+    @property
+    def distance(self) -> Array:
+        """|GCoM - ZMP| (T,) [m]."""
+        return np.asarray(np.linalg.norm(self.com[:, :2] - self.zmp, axis=1))
+
+
+def sole_corners(robot: Robot, foot: str) -> Array:
+    """Corners (k, 3) of a foot's sole in the frame of its tip [m].
+
+    Raises:
+        InputError: the table gives no sole for that limb.
+    """
+    limb = robot.limb(foot)
+    for sole in robot.soles:
+        if sole.limb == limb.name:
+            back = limb.frame.inverse
+            return np.asarray(as_array([back @ corner for corner in sole.corners]))
+    raise InputError(f"robot {robot.name}: limb {limb.name} has no [[sole]]; add one to check the ZMP")
+
+
+def soles_on_floor(robot: Robot, feet: tuple[str, ...], T_world_tip: Mapping[str, Array]) -> Array:
+    """Corners of every sole seen from above, (T, feet, corners, 2) [m]; soles may differ in corner count."""
+    outlines = [sole_corners(robot, foot) for foot in feet]
+    most = max(len(outline) for outline in outlines)
+    padded = [np.concatenate([o, np.repeat(o[-1:], most - len(o), axis=0)]) for o in outlines]
+    placed = [
+        np.einsum("tij,kj->tki", T_world_tip[foot][:, :3, :3], corners) + T_world_tip[foot][:, None, :3, 3]
+        for foot, corners in zip(feet, padded, strict=True)
+    ]
+    return np.stack(placed, axis=1)[..., :2]
+
+
+def ground_reaction(
+    robot: Robot, T_world_base: Array, q: Array, qd: Array, qdd: Array, twist: Array, acceleration: Array
+) -> tuple[Array, Array, Array, Array]:
+    """ZMP (T, 2), CoM (T, 3), ground wrench about the world origin (T, 6), cart-table ZMP (T, 2).
+
+    Args:
+        robot: the robot.
+        T_world_base: (T, 4, 4).
+        q: (T, n), with qd and qdd its derivatives.
+        qd: (T, n).
+        qdd: (T, n).
+        twist: [omega; v of the base origin] (T, 6), world axes.
+        acceleration: its time derivative (T, 6).
+    """
+    T, scalars, batch = pose_from_array(T_world_base), unstack(q), (len(q),)
+    bodies = Bodies.of(robot, T.R, scalars)
+    wrench = ground_wrench(
+        bodies, unstack(qd), unstack(qdd), twist_from_array(twist), twist_from_array(acceleration), GRAVITY
+    )
+    com = T @ center_of_mass(robot, link_displacements(robot, scalars))
+    rise = wrench.f * (1.0 / robot.mass)
+    cart = cart_table_zmp(com, Vector(rise.x, rise.y, rise.z - GRAVITY), GRAVITY)
+    about = wrench_at(-T.p, wrench)
+    return (
+        as_array(zmp_from_wrench(wrench, T.p), batch)[..., :2],
+        as_array(com, batch),
+        as_array(Twist(about.m, about.f), batch),
+        as_array(cart, batch)[..., :2],
+    )
+
+
+def zmp(robot: Robot, trajectory: Trajectory) -> Balance:
+    """CoM, ZMP, margin and spikes of a trajectory, computed anew from its positions, rates and accelerations.
+
+    Raises:
+        InputError: the joints are not those of the robot, or a foot has no sole.
+    """
+    if trajectory.joint_names != robot.joint_names:
+        strange = sorted(set(trajectory.joint_names) ^ set(robot.joint_names))
+        raise InputError(
+            f"the trajectory's joints are not those of {robot.name}: {', '.join(strange) or 'other order'}"
+        )
+    point, com, wrench, cart = ground_reaction(
+        robot,
+        trajectory.T_world_base,
+        trajectory.q,
+        trajectory.qd,
+        trajectory.qdd,
+        trajectory.base_twist,
+        trajectory.base_acceleration,
+    )
+    soles = soles_on_floor(robot, trajectory.feet, trajectory.T_world_tip)
+    margin = support_margin(point, soles, trajectory.contact)
+    return Balance(point, com, wrench, margin, spikes(trajectory.time, com[:, :2], point), cart)
