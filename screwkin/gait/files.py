@@ -1,0 +1,30 @@
+"""Gait files: TOML read into a ``Gait``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from screwkin.errors import GaitError
+from screwkin.gait.record import Gait, gait_from_dict
+from screwkin.model.library import find_gait
+from screwkin.model.toml import read_text, read_toml
+
+
+def load_gait(name_or_path: str | Path) -> Gait:
+    """A bundled gait by its name, or the gait of a file.
+
+    Raises:
+        UnknownNameError: no such gait; the message lists the bundled ones.
+        GaitError: the file cannot be read or is wrong; all faults are told at once.
+    """
+    path = find_gait(name_or_path)
+    return parse_gait(read_text(path, GaitError), str(path))
+
+
+def parse_gait(text: str, path: str = "<text>") -> Gait:
+    """The gait of a TOML text.
+
+    Raises:
+        GaitError: the text is no TOML, or the gait is wrong; all faults are told at once.
+    """
+    return gait_from_dict(read_toml(text, path, GaitError), path)

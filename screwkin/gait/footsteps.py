@@ -1,0 +1,122 @@
+"""Footholds along a path, the swings between them, and which feet bear."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from screwkin.errors import Fault, GaitError
+from screwkin.gait.motion import Motion, along
+from screwkin.gait.path import path_of
+from screwkin.gait.record import Gait
+from screwkin.gait.splines import clamped_cubic, extremes, held, minimum_jerk
+from screwkin.gait.stance import LEFT, RIGHT, Stance
+
+Array = NDArray[np.float64]
+
+_BELOW = 1e-9  # m: what rounding may put below the floor
+_ABOVE = 1.05  # of lift: a spline may overshoot its highest key point so far
+_EDGE = 1e-9  # of a step: rounding of the phase at the ends of a swing
+
+
+@dataclass(frozen=True)
+class Foothold:
+    """Where a foot stands: x, y [m] and yaw [rad] in the world; ``step`` is the swing that ends there.
+
+    The step of the two footholds of the start is -1.
+    """
+
+    foot: str
+    step: int
+    x: float
+    y: float
+    yaw: float
+
+
+def first_side(gait: Gait) -> int:
+    """Side of the foot that swings first."""
+    return RIGHT if gait.first == "right" else LEFT
+
+
+def swing_side(gait: Gait, step: int) -> int:
+    """Side of the foot that swings in a step."""
+    return first_side(gait) * (-1) ** step
+
+
+def footholds(gait: Gait, stance: Stance, steps: int) -> tuple[Foothold, ...]:
+    """Footholds of both feet at the start, then the one that each step reaches.
+
+    With P(n) the place of the waist at the boundary before step n: ``alternate`` lands at P(n + 1.5), half
+    a step ahead of the waist, as the Bioloid paper (eq. 19-20); ``close`` lands the leading foot (even n)
+    at P(n + 2) and the closing one beside it at P(n + 1).
+    """
+    path, lead = path_of(gait), first_side(gait)
+    alternate = gait.footholds == "alternate"
+
+    def hold(side: int, step: int, s: float) -> Foothold:
+        x, y, yaw = path.place(np.array(s), side * (stance.foot_y + gait.spread)).tolist()
+        return Foothold(stance.foot(side).name, step, x, y, yaw)
+
+    half = 0.5 if alternate else 0.0
+    holds = [hold(lead, -1, -half), hold(-lead, -1, half)]
+    for n in range(steps):
+        ahead = 1.5 if alternate else 2.0 - n % 2
+        holds.append(hold(swing_side(gait, n), n, n + ahead))
+    return tuple(holds)
+
+
+def swing_splines(gait: Gait) -> tuple[Any, Any]:
+    """Progress (0 to 1) and height [m] of a swing, functions of the fraction of its step.
+
+    Raises:
+        GaitError: the foot would go below the floor, or far above ``lift``.
+    """
+    through = clamped_cubic if gait.swing == "cubic" else minimum_jerk
+    channels = (gait.channels[name] for name in ("foot_progress", "foot_height"))
+    progress, height = (through(channel.at, channel.value) for channel in channels)
+    at, value = extremes(height)
+    low, high = int(np.argmin(value)), int(np.argmax(value))
+    faults = []
+    for i, wrong, limit in (
+        (low, value[low] < -_BELOW, "below the floor"),
+        (high, value[high] > _ABOVE * gait.lift + _BELOW, f"above lift = {1e3 * gait.lift:g} mm"),
+    ):
+        if wrong:
+            found = f"the {gait.swing} spline reaches {1e3 * value[i]:.3g} mm at {at[i]:.3f} Tc, {limit}"
+            fix = 'Set swing="minimum-jerk", or move the key points (fixed offsets in s ask for another Tc)'
+            faults.append(Fault("[channel.foot_height]", "value", found, fix))
+    if faults:
+        raise GaitError(gait.path or f"gait {gait.name}", faults)
+    return held(progress), held(height)
+
+
+def feet_motion(
+    gait: Gait, stance: Stance, holds: tuple[Foothold, ...], phase: Motion
+) -> tuple[dict[str, Motion], NDArray[np.bool_]]:
+    """Motion of the feet, x, y, z, yaw (T, 4) by name, and which of them bear, (T, feet)."""
+    steps = max(hold.step for hold in holds) + 1
+    n = np.clip(np.floor(phase.value).astype(int), 0, steps - 1)
+    fraction = Motion(phase.value - n, phase.rate, phase.acceleration)
+    progress, height = (along(spline, fraction) for spline in swing_splines(gait))
+    lifted = gait.channels["foot_height"].at
+    in_air = (fraction.value > lifted[0] + _EDGE) & (fraction.value < lifted[-1] - _EDGE)
+    motions, bears = {}, []
+    for foot in stance.feet:
+        own = [hold for hold in holds if hold.foot == foot.name]
+        reached = np.array([[hold.x, hold.y, hold.yaw] for hold in own])
+        # For every step, how many swings this foot has behind it, and whether it swings now.
+        swings = np.array([any(hold.step == k for hold in own) for k in range(steps)])
+        before = np.cumsum(swings) - swings
+        origin, way = reached[before], (reached[before + swings] - reached[before])
+        moving = swings[n]
+        along_way = [p[:, None] * way[n] for p in (progress.value, progress.rate, progress.acceleration)]
+        up = [np.where(moving, h, 0.0) for h in (height.value, height.rate, height.acceleration)]
+        flat = [origin[n] + along_way[0], along_way[1], along_way[2]]
+        motions[foot.name] = Motion(
+            *(np.column_stack([p[:, :2], h, p[:, 2]]) for p, h in zip(flat, up, strict=True))
+        )
+        bears.append(~(moving & in_air))
+    return motions, np.column_stack(bears)

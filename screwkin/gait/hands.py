@@ -1,0 +1,36 @@
+"""The hands: they swing fore and aft below their shoulders, relative to the waist."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from screwkin.gait.footsteps import first_side
+from screwkin.gait.motion import Motion, along, carried_point, together
+from screwkin.gait.record import Gait
+from screwkin.gait.splines import cyclic_cubic
+from screwkin.gait.stance import Stance
+
+
+def hands_motion(gait: Gait, stance: Stance, waist: Motion, phase: Motion) -> dict[str, Motion]:
+    """World motion (T, 3) of every hand by name; positions only.
+
+    ``hand_forward`` [m] moves the hand on the side of the swinging foot, and the other one oppositely
+    (Bioloid paper, eq. 16-17, g = (-1)^n); ``hand_raise`` [m] lifts both above ``hand_drop`` below the
+    shoulder (eq. 18). Without these channels the hands rest there. Periodic C2 cubics: they overshoot the
+    paper's held ends by 4 % (1 mm), where holding them would let the acceleration jump.
+    """
+    swing, lift = (_channel(gait, name, phase) for name in ("hand_forward", "hand_raise"))
+    none = swing * 0.0
+    motions = {}
+    for hand in stance.hands:
+        x, y, z = hand.shoulder
+        own = together(swing * (hand.side * first_side(gait)), none, lift)
+        motions[hand.name] = carried_point(waist, own + np.array([x, y, z - gait.hand_drop]))
+    return motions
+
+
+def _channel(gait: Gait, name: str, phase: Motion) -> Motion:
+    channel = gait.channels.get(name)
+    if channel is None:
+        return phase * 0.0
+    return along(cyclic_cubic(channel.at, channel.value, channel.kind), phase)

@@ -1,0 +1,177 @@
+"""The plan of a walk: what the virtual chains are told to do, sample by sample, in task space."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from screwkin.errors import Fault, GaitError, InputError
+from screwkin.gait.footsteps import Foothold, feet_motion, footholds
+from screwkin.gait.hands import hands_motion
+from screwkin.gait.motion import Motion, level_pose, level_twist
+from screwkin.gait.path import path_of
+from screwkin.gait.record import Gait
+from screwkin.gait.soles import check_soles
+from screwkin.gait.stance import Stance
+from screwkin.gait.timing import Timing
+from screwkin.gait.waist import waist_path
+
+Array = NDArray[np.float64]
+
+MOST_SAMPLES = 1_000_000  # a longer plan would fill the memory of a small computer
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """Targets over T samples, world axes; arrays are read-only.
+
+    time (T,) [s]; phase (T,) [steps]; T_world_base (T, 4, 4); base_twist (T, 6), [omega; v of the base
+    origin], and base_acceleration (T, 6), its time derivative; the same for every foot by the name of its
+    tip, at the tip's own origin: T_world_tip, tip_twist, tip_acceleration; hand_position, hand_velocity,
+    hand_acceleration (T, 3) for every hand; contact (T, feet) bool for ``feet``; footholds: two of the
+    start, then one per step; boundaries (steps + 1,) [s]: when each step begins, and the last ends;
+    sole_gap: smallest distance between the soles seen from above [m]; notes: what the reader should know.
+    """
+
+    gait: Gait
+    steps: int
+    time: Array
+    phase: Array
+    T_world_base: Array
+    base_twist: Array
+    base_acceleration: Array
+    T_world_tip: Mapping[str, Array]
+    tip_twist: Mapping[str, Array]
+    tip_acceleration: Mapping[str, Array]
+    hand_position: Mapping[str, Array]
+    hand_velocity: Mapping[str, Array]
+    hand_acceleration: Mapping[str, Array]
+    contact: NDArray[np.bool_]
+    feet: tuple[str, ...]
+    footholds: tuple[Foothold, ...]
+    boundaries: Array
+    sole_gap: float
+    notes: tuple[str, ...] = ()
+
+    @property
+    def duration(self) -> float:
+        """Time of the last sample [s]."""
+        return float(self.time[-1])
+
+
+def plan(gait: Gait, stance: Stance, steps: int) -> Plan:
+    """The plan of a geometric gait.
+
+    Args:
+        gait: a gait of kind ``geometric``.
+        stance: feet, soles and shoulders of the robot.
+        steps: number of steps, at least 1.
+
+    Returns:
+        Samples from rest (if ``ramp`` > 0) to rest, evenly spaced by nearly 1/rate: their number is rounded
+        such that the last one falls on the end.
+
+    Raises:
+        InputError: ``steps`` is no whole number above 0.
+        GaitError: another kind of gait, a swing below the floor, too many samples, or numbers too large.
+        NoSolutionError: the soles overlap.
+
+    Source: Bioloid paper, eq. 16-24, generalised to arcs and to stepping sideways.
+    """
+    steps = _whole(steps)
+    if gait.kind != "geometric":
+        found = f"a gait of kind {gait.kind!r} is not made of key points alone"
+        raise GaitError(_where(gait), [Fault("[gait]", "kind", found, 'Give one of kind "geometric"')])
+    timing = Timing(gait.Tc, steps, gait.ramp)
+    time = sample_times(gait, timing)
+    with np.errstate(all="ignore"):  # absurd sizes are told below, in words
+        phase = timing.phase(time)
+        holds = footholds(gait, stance, steps)
+        feet, contact = feet_motion(gait, stance, holds, phase)
+        progress, side = waist_path(gait, steps).motions(phase)
+        waist = path_of(gait).follow(progress, side, gait.waist_height)
+        hands = hands_motion(gait, stance, waist, phase)
+    _check_finite(gait, {"waist": waist, **feet, **hands})
+    gap = check_soles(gait, stance, feet, time)
+    return Plan(
+        gait=gait,
+        steps=steps,
+        time=_kept(time),
+        phase=_kept(phase.value),
+        T_world_base=_kept(level_pose(waist)),
+        base_twist=_kept(level_twist(waist.rate)),
+        base_acceleration=_kept(level_twist(waist.acceleration)),
+        T_world_tip=_each(feet, lambda foot: level_pose(foot)),
+        tip_twist=_each(feet, lambda foot: level_twist(foot.rate)),
+        tip_acceleration=_each(feet, lambda foot: level_twist(foot.acceleration)),
+        hand_position=_each(hands, lambda hand: hand.value),
+        hand_velocity=_each(hands, lambda hand: hand.rate),
+        hand_acceleration=_each(hands, lambda hand: hand.acceleration),
+        contact=_kept(contact),
+        feet=tuple(foot.name for foot in stance.feet),
+        footholds=holds,
+        boundaries=_kept(timing.time_of(np.arange(steps + 1.0))),
+        sole_gap=gap,
+        notes=_notes(gait, timing),
+    )
+
+
+def sample_times(gait: Gait, timing: Timing) -> Array:
+    """Sample times of a walk (T,) [s].
+
+    Raises:
+        GaitError: fewer than two samples, or more than ``MOST_SAMPLES``.
+    """
+    count = timing.duration * gait.rate + 1
+    if not 1.5 <= count <= MOST_SAMPLES:
+        found = f"{gait.rate:g} per second over {timing.duration:g} s make {count:.6g} samples"
+        raise GaitError(
+            _where(gait), [Fault("[gait]", "rate", found, f"Keep them between 2 and {MOST_SAMPLES:,}")]
+        )
+    return timing.samples(gait.rate)
+
+
+def _whole(steps: object) -> int:
+    if isinstance(steps, bool) or not isinstance(steps, int | np.integer) or steps < 1:
+        raise InputError(f"steps is {steps!r}; expected a whole number, at least 1")
+    return int(steps)
+
+
+def _where(gait: Gait) -> str:
+    return gait.path or f"gait {gait.name}"
+
+
+def _check_finite(gait: Gait, motions: Mapping[str, Motion]) -> None:
+    for name, motion in motions.items():
+        if not all(np.isfinite(x).all() for x in (motion.value, motion.rate, motion.acceleration)):
+            found = f"the motion of {name} is beyond all numbers"
+            fix = "Give stride, side, turn and Tc of sensible size"
+            raise GaitError(_where(gait), [Fault("[gait]", "", found, fix)])
+
+
+def _notes(gait: Gait, timing: Timing) -> tuple[str, ...]:
+    notes = []
+    if timing.ramp_steps < gait.ramp:
+        few = "1 step is" if timing.steps == 1 else f"{timing.steps} steps are"
+        notes.append(
+            f"start and stop take {timing.ramp_steps:g} instead of {gait.ramp:g} steps each: {few} too few"
+        )
+    if gait.ramp == 0:
+        notes.append("ramp = 0: the walk starts and stops at full speed")
+    return tuple(notes)
+
+
+def _kept(array: Any) -> Any:
+    """A read-only copy."""
+    array = np.array(array)
+    array.flags.writeable = False
+    return array
+
+
+def _each(motions: Mapping[str, Motion], part: Any) -> Mapping[str, Array]:
+    return MappingProxyType({name: _kept(part(motion)) for name, motion in motions.items()})

@@ -1,0 +1,266 @@
+"""The gait as a value: parameters and key points, checked and evaluated.
+
+A gait is made from a document, the content of its file as plain dictionaries; the document is kept, so that
+changing a parameter evaluates every formula again and ``to_dict`` tells all that is needed to make it anew.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, cast
+
+from screwkin.errors import Fault, GaitError
+from screwkin.gait.free_path import read_free_waist
+from screwkin.gait.keypoints import CHANNELS, Channel, channel_faults, increases, read_channel
+from screwkin.gait.settings import place, valid_keys
+from screwkin.model.expression import near, resolve_parameters
+
+Kind = Literal["geometric", "preview"]
+Swing = Literal["cubic", "minimum-jerk"]
+Footholds = Literal["alternate", "close"]
+Side = Literal["right", "left"]
+
+TEXTS = ("name", "description", "source")
+CHOICES: Mapping[str, tuple[str, ...]] = {
+    "kind": ("geometric", "preview"),
+    "swing": ("minimum-jerk", "cubic"),
+    "footholds": ("alternate", "close"),
+    "first": ("right", "left"),
+}
+"""Parameters that choose; the first one is the default."""
+
+NUMBERS: Mapping[str, float | None] = {
+    "Tc": None,
+    "stride": None,
+    "side": 0.0,
+    "turn": 0.0,
+    "lift": None,
+    "waist_height": None,
+    "hand_drop": None,
+    "sway": 1.0,
+    "spread": 0.0,
+    "ramp": 1.0,
+    "rate": 50.0,
+}
+"""Parameters that are numbers, with their defaults; None: the file must say it."""
+
+_POSITIVE = ("Tc", "lift", "waist_height", "hand_drop", "rate")
+_TABLES = ("gait", "parameters", "channel", "waist")
+
+
+@dataclass(frozen=True, eq=False)
+class Gait:
+    """A gait. Lengths in m, angles in rad, times in s; made by ``load_gait`` or ``gait_from_dict``.
+
+    Tc: period of one step. stride, side, turn: displacement of a foot per swing, forward, to the left and
+    about the vertical. lift: height of a swing. waist_height: of the base above the floor. hand_drop: hands
+    below their shoulders. sway: factor on the lateral motion of the waist. spread: added to each foot's
+    distance from the middle. ramp: steps over which the gait starts and stops (0: at once). rate: samples
+    per second. footholds: ``alternate`` (each foot passes the other) or ``close`` (one leads, the other
+    closes up); first: the foot that swings first. swing: spline of a swing. numbers: all of these and the
+    file's own parameters. channels: key points. waist: coefficients of a free waist path, or empty.
+    """
+
+    name: str
+    description: str
+    source: str
+    kind: Kind
+    Tc: float
+    stride: float
+    side: float
+    turn: float
+    lift: float
+    waist_height: float
+    hand_drop: float
+    sway: float
+    spread: float
+    ramp: float
+    rate: float
+    swing: Swing
+    footholds: Footholds
+    first: Side
+    numbers: Mapping[str, float]
+    channels: Mapping[str, Channel]
+    waist: Mapping[str, tuple[float, ...]]
+    path: str = ""
+    _document: Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+    def replace(self, **parameters: Any) -> Gait:
+        """The gait with other parameters; numbers may be given as text or formulas, as on a command line.
+
+        Key points are reached by dotted keys: ``{"channel.waist_side.value.2": 0.05}``, or a whole list
+        ``{"channel.waist_side.value": [...]}``.
+
+        Raises:
+            GaitError: an unknown key (the message lists the valid ones) or a wrong value; all at once.
+        """
+        document = self.to_dict()
+        faults = []
+        for key, value in parameters.items():
+            if not place(document, key, value):
+                valid = valid_keys(document)
+                fix = f"{near(key, valid)}Valid: {', '.join(valid)}; one entry of a list by its number: KEY.0"
+                faults.append(Fault("", key, "no such parameter", fix))
+        where = self.path or f"gait {self.name}"
+        told = f"{where} with {', '.join(f'{key}={value}' for key, value in parameters.items())}"
+        if faults:
+            raise GaitError(told, faults)
+        return replace(gait_from_dict(document, told), path=where)
+
+    def to_dict(self) -> dict[str, Any]:
+        """All of the gait as JSON data; ``gait_from_dict`` makes the same gait of it."""
+        return copy.deepcopy(dict(self._document))
+
+
+def gait_from_dict(document: Mapping[str, Any], path: str = "<gait>") -> Gait:
+    """The gait of a document: tables ``gait``, ``parameters``, ``channel`` and ``waist``.
+
+    Args:
+        document: as read from a gait file or made by ``Gait.to_dict``.
+        path: of the file, for messages.
+
+    Raises:
+        GaitError: with every fault of the document.
+    """
+    faults: list[Fault] = []
+    tables = _tables(document, faults)
+    flat = _flat(tables["gait"], faults)
+    numbers = _numbers(flat, tables["parameters"], faults)
+    channels = _channels(tables, flat, numbers, faults)
+    waist = read_free_waist(tables["waist"], faults)
+    _check_complete(flat["kind"], channels, waist, tables["channel"], faults)
+    if faults:
+        raise GaitError(path, faults)
+    values = cast(dict[str, float], numbers)
+    return Gait(
+        **flat | {name: values[name] for name in NUMBERS},
+        numbers=values,
+        channels=channels,
+        waist=waist,
+        path=path,
+        _document=copy.deepcopy({**tables, "gait": flat}),
+    )
+
+
+def _tables(document: Mapping[str, Any], faults: list[Fault]) -> dict[str, dict[str, Any]]:
+    """The document's tables, empty where absent."""
+    for key in document:
+        if key not in _TABLES:
+            found = "unknown table"
+            faults.append(Fault(f"[{key}]", "", found, f"{near(key, _TABLES)}Valid: {', '.join(_TABLES)}"))
+    tables: dict[str, dict[str, Any]] = {}
+    for name in _TABLES:
+        table = document.get(name, {})
+        if not isinstance(table, Mapping):
+            faults.append(Fault(f"[{name}]", "", f"{table!r} is no table", f"Write [{name}] above its keys"))
+            table = {}
+        tables[name] = dict(table)
+    return tables
+
+
+def _flat(table: Mapping[str, Any], faults: list[Fault]) -> dict[str, Any]:
+    """The table ``[gait]`` with defaults filled in, texts and choices checked, numbers still as written."""
+    row, known = "[gait]", (*TEXTS, *CHOICES, *NUMBERS)
+    for key in table:
+        if key not in known:
+            fix = f"{near(key, known)}Valid: {', '.join(known)}; numbers of your own go to [parameters]"
+            faults.append(Fault(row, key, "unknown key", fix))
+    flat: dict[str, Any] = {}
+    for key in TEXTS:
+        flat[key] = table.get(key, "")
+        if not isinstance(flat[key], str):
+            faults.append(Fault(row, key, f"{flat[key]!r} is no text", "Write it in quotes"))
+    if not flat["name"]:
+        faults.append(Fault(row, "name", "missing", "Name the gait"))
+    for key, choices in CHOICES.items():
+        flat[key] = table.get(key, choices[0])
+        if flat[key] not in choices:
+            found = f"{flat[key]!r} is not understood"
+            faults.append(Fault(row, key, found, f"Valid: {', '.join(choices)}"))
+    for key, default in NUMBERS.items():
+        if key not in table and default is None:
+            faults.append(Fault(row, key, "missing", "Give a number"))
+        flat[key] = table.get(key, default)
+    return flat
+
+
+def _raw_numbers(flat: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: flat[key] for key in NUMBERS if flat[key] is not None} | {
+        key: value for key, value in own.items() if key not in flat
+    }
+
+
+def _numbers(flat: Mapping[str, Any], own: Mapping[str, Any], faults: list[Fault]) -> dict[str, float | None]:
+    """Values of all numeric parameters; None for a faulty one."""
+    for key in own:
+        if key in flat:
+            found = f"{key!r} is a parameter of [gait]"
+            faults.append(Fault("[parameters]", key, found, "Set it there, or choose another name"))
+    values, wrong = resolve_parameters(_raw_numbers(flat, own), row="[gait]")
+    faults += [fault if fault.key in flat else _moved(fault, "[parameters]") for fault in wrong]
+    numbers = {name: None if value is None else float(value) for name, value in values.items()}
+    for key in (*_POSITIVE, "ramp"):
+        value, least = numbers.get(key), "at least 0" if key == "ramp" else "above 0"
+        if value is not None and (value < 0 or (value == 0 and key != "ramp")):
+            faults.append(Fault("[gait]", key, f"{value:g} is not {least}", f"Give a number {least}"))
+            numbers[key] = None
+    return {name: numbers.get(name) for name in (*NUMBERS, *numbers)}
+
+
+def _moved(fault: Fault, row: str) -> Fault:
+    return Fault(row, fault.key, fault.found, fault.fix)
+
+
+def _channels(
+    tables: Mapping[str, Mapping[str, Any]],
+    flat: Mapping[str, Any],
+    numbers: Mapping[str, float | None],
+    faults: list[Fault],
+) -> dict[str, Channel]:
+    """The sound ones of the channels."""
+    channels: dict[str, Channel] = {}
+    for name, raw in tables["channel"].items():
+        row = f"[channel.{name}]"
+        if name not in CHANNELS:
+            fix = f"{near(name, CHANNELS)}Valid: {', '.join(CHANNELS)}"
+            faults.append(Fault(row, "", "unknown channel", fix))
+            continue
+        channel = read_channel(name, raw, numbers, faults)
+        if channel is None:
+            continue
+
+        def works_at(Tc: float, name: str = name, raw: Any = raw) -> bool:
+            at_that, _ = resolve_parameters(_raw_numbers({**flat, "Tc": Tc}, tables["parameters"]))
+            other = read_channel(name, raw, at_that, [])
+            return other is not None and increases(other)
+
+        wrong = channel_faults(channel, numbers["Tc"] or 1.0, works_at)
+        faults += wrong
+        if not wrong:
+            channels[name] = channel
+    return channels
+
+
+def _check_complete(
+    kind: str,
+    channels: Mapping[str, Channel],
+    waist: Mapping[str, Any],
+    written: Mapping[str, Any],
+    faults: list[Fault],
+) -> None:
+    """Channels that must be there, and the feet's two channels against each other."""
+    needed = ["foot_progress", "foot_height"]
+    if kind == "geometric" and not waist:
+        needed += ["waist_progress", "waist_side"]
+    for name in needed:
+        if name not in written:
+            fix = "Give its key points: at = [...], value = [...]"
+            faults.append(Fault(f"[channel.{name}]", "", "missing", fix))
+    if "foot_progress" in channels and "foot_height" in channels:
+        moves, lifted = channels["foot_progress"].at, channels["foot_height"].at
+        if moves[0] < lifted[0] - 1e-9 or moves[-1] > lifted[-1] + 1e-9:
+            found = f"the foot moves from {moves[0]:.6g} to {moves[-1]:.6g} Tc"
+            fix = f"Keep it within its time off the floor, {lifted[0]:.6g} to {lifted[-1]:.6g} Tc"
+            faults.append(Fault("[channel.foot_progress]", "at", found, fix))

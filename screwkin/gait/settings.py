@@ -1,0 +1,57 @@
+"""Values set over a gait's document, by flat or dotted key."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+_LISTS = {"channel": 2, "waist": 1}  # tables of lists, and how many names lead to a list
+
+
+def valid_keys(document: Mapping[str, Any]) -> list[str]:
+    """Keys that may be set: flat parameters, the file's own ones, then its lists of numbers."""
+    keys = [*document["gait"], *document["parameters"]]
+    keys += [f"channel.{name}.{part}" for name in document["channel"] for part in ("at", "value")]
+    return keys + [f"waist.{name}" for name in document["waist"]]
+
+
+def place(document: dict[str, Any], key: str, value: Any) -> bool:
+    """Set a value in the document, in place; False if the key names nothing in it.
+
+    Keys: a parameter; ``channel.NAME.at`` or ``.value`` and ``waist.NAME``, with a list or its text
+    ``"[0, lift/2, lift]"``; or one entry of such a list, by its number from 0: ``channel.NAME.value.2``.
+    """
+    for table in ("gait", "parameters"):
+        if key in document[table]:
+            document[table][key] = value
+            return True
+    first, *names = key.split(".")
+    depth = _LISTS.get(first, 0)
+    if not depth or len(names) not in (depth, depth + 1):
+        return False
+    holder: Any = document[first]
+    for name in names[: depth - 1]:
+        holder = holder.get(name, {})
+    last = names[depth - 1]
+    if last not in holder:
+        return False
+    if len(names) == depth:
+        holder[last] = _items(value) if isinstance(value, str) else value
+        return True
+    index = names[depth]
+    if not index.isdecimal() or int(index) >= len(holder[last]):
+        return False
+    holder[last] = [value if i == int(index) else item for i, item in enumerate(holder[last])]
+    return True
+
+
+def _items(text: str) -> list[str]:
+    """Entries of a list written as text, divided at commas outside parentheses."""
+    items, depth = [""], 0
+    for character in text.strip().removeprefix("[").removesuffix("]"):
+        depth += (character == "(") - (character == ")")
+        if character == "," and depth == 0:
+            items.append("")
+        else:
+            items[-1] += character
+    return [item.strip() for item in items]

@@ -1,0 +1,76 @@
+"""Whether the soles, seen from above, run into each other."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from screwkin.dynamics.support import convex_hull
+from screwkin.errors import NoSolutionError
+from screwkin.gait.motion import Motion
+from screwkin.gait.record import Gait
+from screwkin.gait.stance import Stance
+
+Array = NDArray[np.float64]
+
+_TOUCH = 1e-9  # m: soles may touch
+
+
+def outlines(corners: Array, motion: Motion) -> Array:
+    """World corners (T, k, 2) of a sole (k, 2), carried by x, y, z, yaw (T, 4)."""
+    x, y, _, yaw = motion.value.T
+    c, n = np.cos(yaw), np.sin(yaw)
+    R = np.stack([np.stack([c, -n], axis=-1), np.stack([n, c], axis=-1)], axis=-2)
+    return np.asarray(np.einsum("tij,kj->tki", R, corners) + np.stack([x, y], axis=-1)[:, None])
+
+
+def separation(a: Array, b: Array) -> Array:
+    """Gap (T,) [m] between convex polygons (T, k, 2), corners counter-clockwise; negative: they overlap.
+
+    By separating axes: some edge of one of two disjoint convex polygons has the other one beyond it.
+    """
+
+    def beyond(own: Array, other: Array) -> Array:
+        edge = np.roll(own, -1, axis=1) - own
+        outward = np.stack([edge[..., 1], -edge[..., 0]], axis=-1)
+        outward = outward / np.linalg.norm(outward, axis=-1, keepdims=True)
+        reach = np.einsum("tki,tki->tk", outward, own)
+        return np.asarray((np.einsum("tki,tci->tkc", outward, other).min(axis=-1) - reach).max(axis=-1))
+
+    return np.maximum(beyond(a, b), beyond(b, a))
+
+
+def check_soles(gait: Gait, stance: Stance, feet: dict[str, Motion], time: Array) -> float:
+    """Smallest gap between the soles [m], seen from above, over all samples.
+
+    The swing foot counts as well: it passes too low to pass over the other.
+
+    Raises:
+        NoSolutionError: they overlap; the message names feet and time.
+    """
+    first, second = stance.feet
+    a, b = (
+        outlines(convex_hull(np.asarray(foot.sole, dtype=float)), feet[foot.name]) for foot in (first, second)
+    )
+    gap = separation(a, b)
+    if gap.min() < -_TOUCH:
+        early = int(np.argmax(gap < -_TOUCH))
+        raise NoSolutionError(
+            f"gait {gait.name}: the soles of {first.name} and {second.name} overlap from"
+            f" {time[early]:.3f} s on, by up to {-1e3 * gap.min():.1f} mm. {_advice(gait)}"
+        )
+    return float(gap.min())
+
+
+def _advice(gait: Gait) -> str:
+    towards = gait.side if gait.side != 0 else gait.turn
+    wanted = "left" if towards > 0 else "right"
+    if gait.footholds == "close" and towards != 0 and gait.first != wanted:
+        return f"Lead with the foot on the side of the motion: first={wanted!r}"
+    moving = [
+        f"{name} = {getattr(gait, name):g} {unit}"
+        for name, unit in (("side", "m"), ("turn", "rad"))
+        if getattr(gait, name)
+    ]
+    less = f"Bring {' or '.join(moving)} nearer to 0, or raise" if moving else "Raise"
+    return f"{less} spread = {gait.spread:g} m"

@@ -1,0 +1,94 @@
+"""Splines through key points: clamped cubic, minimum-jerk, and cyclic cubic.
+
+All are functions f(x, order) of the phase in steps, for the value (order 0) and its derivatives.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def clamped_cubic(at: Array, value: Array) -> Any:
+    """Cubic C2 spline through key points, at rest at the first and the last; a scipy PPoly."""
+    from scipy.interpolate import CubicSpline
+
+    return CubicSpline(at, value, bc_type="clamped")
+
+
+def minimum_jerk(at: Array, value: Array) -> Any:
+    """Quintic blends with rest (no velocity, no acceleration) at ends and extremal key points; a scipy PPoly.
+
+    A key point that is merely passed on the way, its value strictly between its neighbours' ones, is left
+    out: to rest there would cost jerk, and to pass through it a dive below the floor.
+
+    Source: Flash and Hogan (1985), the motion of least integrated squared jerk between two rests.
+    """
+    from scipy.interpolate import PPoly
+
+    step = np.diff(value)
+    kept = np.concatenate([[True], step[:-1] * step[1:] <= 0, [True]])
+    x, y = at[kept], value[kept]
+    h, rise = np.diff(x), np.diff(y)
+    none = np.zeros_like(h)
+    return PPoly(np.stack([6 * rise / h**5, -15 * rise / h**4, 10 * rise / h**3, none, none, y[:-1]]), x)
+
+
+def held(spline: Any) -> Any:
+    """The spline of a swing made constant before its first and after its last key point, on [0, 1]."""
+    from scipy.interpolate import PPoly
+
+    x, c = spline.x, spline.c
+    first, last = np.zeros((len(c), 1)), np.zeros((len(c), 1))
+    first[-1], last[-1] = c[-1, 0], spline(x[-1])
+    if x[0] > 0:
+        x, c = np.r_[0.0, x], np.hstack([first, c])
+    if x[-1] < 1:
+        x, c = np.r_[x, 1.0], np.hstack([c, last])
+    return PPoly(c, x)
+
+
+def extremes(spline: Any) -> tuple[Array, Array]:
+    """Places and values (k,) among which the spline's smallest and largest values are."""
+    inner = spline.derivative().roots(discontinuity=False, extrapolate=False)
+    at = np.concatenate([spline.x, inner[np.isfinite(inner)]])
+    return at, np.asarray(spline(at))
+
+
+@dataclass(frozen=True, eq=False)
+class Cyclic:
+    """A C2 function over all steps: a spline of period two, plus ``slope`` per step."""
+
+    spline: Any
+    slope: float = 0.0
+
+    def __call__(self, phase: Array, order: int = 0) -> Array:
+        """Value or derivative (T,) at phases (T,)."""
+        value = np.asarray(self.spline(phase, order))
+        if order == 0:
+            return value + self.slope * phase
+        return value + self.slope if order == 1 else value
+
+
+def cyclic_cubic(at: Array, value: Array, kind: str) -> Cyclic:
+    """Periodic C2 cubic spline through a channel's key points.
+
+    Args:
+        at: key times from 0 to 1 (a step) or to 2 (a cycle of two), in steps.
+        value: at those times.
+        kind: ``advance``, ``alternate`` or ``repeat``: how one step follows the other (see ``keypoints``).
+    """
+    from scipy.interpolate import CubicSpline
+
+    slope = 1.0 if kind == "advance" else 0.0
+    x, y = at, value - slope * at
+    if at[-1] < 1.5:
+        x = np.concatenate([at, 1 + at[1:]])
+        y = np.concatenate([y, (-1 if kind == "alternate" else 1) * y[1:]])
+    x[-1], y[-1] = 2.0, y[0]  # equal up to rounding, as checked; scipy wants it exactly
+    return Cyclic(CubicSpline(x, y, bc_type="periodic"), slope)
