@@ -40,7 +40,7 @@ def link_poses(robot: Robot, state: State) -> Array:
     Raises:
         ShapeError: wrong shape, NaN or infinity.
 
-    Source: Bioloid paper, eq. 2-3.
+    Source: paper A, eq. 2-3.
     """
     T, q, batch = parts(robot, state)
     D = positions.link_displacements(robot, q)

@@ -31,7 +31,7 @@ def network_matrix(mechanism: Mechanism, state: State, point: Any = None) -> Arr
         point: world point (..., 3) [m] where the screws are told; default: the waist origin, which travels
             with the robot. A far point spoils the conditioning.
 
-    Source: Bioloid paper, eq. 8-9.
+    Source: paper A, eq. 8-9.
     """
     T, q, batch = parts(mechanism.robot, state)
     p = ZERO if point is None else vector_from_array(checked("point", point, 3)) - T.p
@@ -55,7 +55,7 @@ def virtual_motion(
     Raises:
         InputError: a real joint is primary, or a tip's twist is missing or lacks a rotation.
 
-    Source: Bioloid paper, eq. 7.
+    Source: paper A, eq. 7.
     """
     T, q, batch = parts(mechanism.robot, state)
     twists: dict[str, Twist] = {}
@@ -96,7 +96,7 @@ def secondary_rates(
     Raises:
         SingularError: a limb is singular; names limb and sample.
 
-    Source: Bioloid paper, eq. 10-11.
+    Source: paper A, eq. 10-11.
     """
     primary = checked("primary_rates", primary_rates, len(mechanism.primary))
     solution = rates.secondary_rates(mechanism, network_matrix(mechanism, state), primary)

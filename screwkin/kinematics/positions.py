@@ -20,7 +20,7 @@ def successive_displacement(
 
     ``A_c_ref`` and ``A_ref_k`` are the zero-pose transforms from c to that reference frame and from it to k.
 
-    Source: Bioloid paper, eq. 3 (and eq. 13-14 for the leg with its reference in mid-calf).
+    Source: paper A, eq. 3 (and eq. 13-14 for the leg with its reference in mid-calf).
     """
     A = A_c_ref
     for screw, theta in zip(screws, thetas, strict=True):

@@ -3,7 +3,7 @@
 A chain is a tuple of couplings: translations ``px py pz`` along world axes, each at most once, then rotations
 ``rx ry rz``, each at most once, about axes carried by the rotations before. 3P3R is the chain of space, PPR
 that of the plane; any other selection and order of rotations makes a chain too.
-Source: Campos et al. (2005), Bioloid paper section 2.3.
+Source: Campos et al. (2005), paper A section 2.3.
 """
 
 from __future__ import annotations

@@ -104,7 +104,7 @@ def closed_mechanism(robot: Robot, primary: Sequence[str] | None = None) -> Mech
         InputError: too few or too many primary couplings, with the ones to move.
         SingularError: the right number, but dependent; says which to exchange.
 
-    Source: Davies (1981); Bioloid paper, eq. 9-11, 15.
+    Source: Davies (1981); paper A, eq. 9-11, 15.
     """
     chains = virtual_chains(robot)
     graph = coupling_graph(robot, chains)

@@ -1,6 +1,6 @@
 """Coupling graph: links are vertices, couplings are directed edges; trees, circuits and cut-sets.
 
-Pure integer work. Source: Davies (1981), after Kirchhoff; Bioloid paper, section 2.4 and fig. 5.
+Pure integer work. Source: Davies (1981), after Kirchhoff; paper A, section 2.4 and fig. 5.
 """
 
 from __future__ import annotations

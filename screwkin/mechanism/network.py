@@ -1,6 +1,6 @@
 """Davies' network matrix: the circuits' screws, formed at a point that travels with the robot.
 
-Source: Bioloid paper, eq. 8-11 and 15. The circulation law N q' = 0 holds at any point; far from the robot
+Source: paper A, eq. 8-11 and 15. The circulation law N q' = 0 holds at any point; far from the robot
 the matrix loses digits (condition 1e2 at the waist, 2.5e5 at 50 m), so screws are told at the waist origin.
 """
 

@@ -1,6 +1,6 @@
 """What the virtual chains do when their bodies move as wanted: coupling rates from twists.
 
-Source: Bioloid paper, eq. 7. Translations follow the body's own origin, rotations are Euler rates.
+Source: paper A, eq. 7. Translations follow the body's own origin, rotations are Euler rates.
 """
 
 from __future__ import annotations

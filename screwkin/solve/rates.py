@@ -1,6 +1,6 @@
 """Secondary rates and accelerations from the primary ones: Davies' method, batched.
 
-Source: Bioloid paper, eq. 10-11. The system falls apart into blocks of circuits that share secondary
+Source: paper A, eq. 10-11. The system falls apart into blocks of circuits that share secondary
 couplings (for a humanoid whose waist is imposed: one limb each), and each block is one small solve.
 """
 
