@@ -50,9 +50,7 @@ def main() -> float:
     turned = sk.closed_mechanism(robot, primary=[*legs, *ankle, *feet, *hands])
     bent = close_loops(turned, home, {"right_knee": home.q[3] + np.radians(np.linspace(0, 5, 6))})
     sink = 1e3 * (bent.state.T_world_base[:, 2, 3] - home.T_world_base[2, 3])
-    print(
-        f"right knee imposed, waist follows: {sink[-1]:.1f} mm after 5 deg, residual {bent.residual.max():.0e}"
-    )
+    print(f"right knee imposed, waist follows by {sink[-1]:.1f} mm, residual {bent.residual.max():.0e}")
     return error
 
 

@@ -1,7 +1,7 @@
 """Why positions come from the loops and not from integrated rates.
 
 Davies' method gives rates. Integrated over four steps of the paper's gait they drift, and the loops open: by
-centimetres with Euler's method, by micrometres with Runge-Kutta. Newton's method on the loops has no memory.
+centimetres with Euler's method, far less with Runge-Kutta. Newton's method on the loops has no memory.
 """
 
 import numpy as np

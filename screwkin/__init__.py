@@ -3,28 +3,94 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from screwkin.analysis.validate import Validation, validate
+    from screwkin.api.body import (
+        center_of_mass,
+        com_jacobian,
+        frame_pose,
+        ground_wrench,
+        home,
+        inverse_dynamics,
+        jacobian,
+        link_poses,
+        mass_matrix,
+        momentum,
+    )
+    from screwkin.api.mechanism import network_matrix, secondary_rates, solve_pose, virtual_motion
+    from screwkin.errors import ScrewkinError
+    from screwkin.gait.balance import Balance, zmp
+    from screwkin.gait.files import load_gait
+    from screwkin.gait.record import Gait
+    from screwkin.gait.walk import walk
+    from screwkin.mechanism.choice import closed_mechanism
+    from screwkin.mechanism.mechanism import Mechanism
+    from screwkin.model.robot import Robot
+    from screwkin.model.state import State
+    from screwkin.model.table import load_robot
+    from screwkin.solve.closure import close_loops
+    from screwkin.solve.singularity import singularity_report
+    from screwkin.trajectory import Trajectory, load_trajectory
 
 _HOMES = {
-    "screwkin.api.body": (
-        "home link_poses frame_pose jacobian center_of_mass com_jacobian momentum mass_matrix"
-        " inverse_dynamics ground_wrench"
+    "analysis.validate": "Validation validate",
+    "api.body": (
+        "center_of_mass com_jacobian frame_pose ground_wrench home inverse_dynamics jacobian link_poses"
+        " mass_matrix momentum"
     ),
-    "screwkin.gait.balance": "zmp",
-    "screwkin.gait.files": "load_gait",
-    "screwkin.gait.walk": "walk",
-    "screwkin.trajectory": "Trajectory load_trajectory",
-    "screwkin.api.mechanism": "network_matrix virtual_motion secondary_rates solve_pose",
-    "screwkin.mechanism.choice": "closed_mechanism",
-    "screwkin.model.robot": "Robot",
-    "screwkin.model.state": "State",
-    "screwkin.model.table": "load_robot",
-    "screwkin.errors": "ScrewkinError",
+    "api.mechanism": "network_matrix secondary_rates solve_pose virtual_motion",
+    "errors": "ScrewkinError",
+    "gait.balance": "Balance zmp",
+    "gait.files": "load_gait",
+    "gait.record": "Gait",
+    "gait.walk": "walk",
+    "mechanism.choice": "closed_mechanism",
+    "mechanism.mechanism": "Mechanism",
+    "model.robot": "Robot",
+    "model.state": "State",
+    "model.table": "load_robot",
+    "solve.closure": "close_loops",
+    "solve.singularity": "singularity_report",
+    "trajectory": "Trajectory load_trajectory",
 }
-_HOME_OF = {name: module for module, names in _HOMES.items() for name in names.split()}
+_HOME_OF = {name: f"screwkin.{module}" for module, names in _HOMES.items() for name in names.split()}
 
 __version__ = "0.1.0"
-__all__ = sorted(_HOME_OF)
+__all__ = [
+    "Balance",
+    "Gait",
+    "Mechanism",
+    "Robot",
+    "ScrewkinError",
+    "State",
+    "Trajectory",
+    "Validation",
+    "center_of_mass",
+    "close_loops",
+    "closed_mechanism",
+    "com_jacobian",
+    "frame_pose",
+    "ground_wrench",
+    "home",
+    "inverse_dynamics",
+    "jacobian",
+    "link_poses",
+    "load_gait",
+    "load_robot",
+    "load_trajectory",
+    "mass_matrix",
+    "momentum",
+    "network_matrix",
+    "secondary_rates",
+    "singularity_report",
+    "solve_pose",
+    "validate",
+    "virtual_motion",
+    "walk",
+    "zmp",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -15,7 +15,8 @@ EXAMPLES = sorted(FOLDER.glob("[0-9]*.py"))
 def example(number: str) -> ModuleType:
     (path,) = FOLDER.glob(f"{number}_*.py")
     spec = importlib.util.spec_from_file_location(path.stem, path)
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -31,7 +32,8 @@ def test_davies_rates_are_the_slopes_of_closed_positions() -> None:
 
 def test_integrated_rates_drift_and_closed_loops_do_not() -> None:
     errors = example("03").main()
-    assert errors["euler"] > 1e-3 > 1e-4 > errors["rk4"] > 1e-10 > errors["newton"]
+    assert errors["euler"] > 20 * errors["rk4"] > 1e-6
+    assert errors["newton"] < 1e-10
 
 
 def test_the_simulated_zmp_confirms_the_predicted_one() -> None:
@@ -41,4 +43,5 @@ def test_the_simulated_zmp_confirms_the_predicted_one() -> None:
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_an_example_is_short_and_says_what_it_shows(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
-    assert text.startswith('"""') and len(text.splitlines()) <= 110
+    assert text.startswith('"""')
+    assert len(text.splitlines()) <= 110
