@@ -50,7 +50,7 @@ def footholds(gait: Gait, stance: Stance, steps: int) -> tuple[Foothold, ...]:
     """Footholds of both feet at the start, then the one that each step reaches.
 
     With P(n) the place of the waist at the boundary before step n: ``alternate`` lands at P(n + 1.5), half
-    a step ahead of the waist, as the Bioloid paper (eq. 19-20); ``close`` lands the leading foot (even n)
+    a step ahead of the waist, as the walking paper (eq. 19-20); ``close`` lands the leading foot (even n)
     at P(n + 2) and the closing one beside it at P(n + 1).
     """
     path, lead = path_of(gait), first_side(gait)
@@ -96,27 +96,43 @@ def swing_splines(gait: Gait) -> tuple[Any, Any]:
 def feet_motion(
     gait: Gait, stance: Stance, holds: tuple[Foothold, ...], phase: Motion
 ) -> tuple[dict[str, Motion], NDArray[np.bool_]]:
-    """Motion of the feet, x, y, z, yaw (T, 4) by name, and which of them bear, (T, feet)."""
+    """Motion of the feet, x, y, z, yaw (T, 4) by name, and which of them bear, (T, feet).
+
+    A foot that bears stands on its foothold to the last bit, with no rate and no acceleration.
+    """
     steps = max(hold.step for hold in holds) + 1
     n = np.clip(np.floor(phase.value).astype(int), 0, steps - 1)
     fraction = Motion(phase.value - n, phase.rate, phase.acceleration)
     progress, height = (along(spline, fraction) for spline in swing_splines(gait))
-    lifted = gait.channels["foot_height"].at
-    in_air = (fraction.value > lifted[0] + _EDGE) & (fraction.value < lifted[-1] - _EDGE)
+    liftoff, landing = gait.channels["foot_height"].at[[0, -1]]
+    landed = fraction.value >= landing - _EDGE
+    in_air = (fraction.value > liftoff + _EDGE) & ~landed
     motions, bears = {}, []
     for foot in stance.feet:
         own = [hold for hold in holds if hold.foot == foot.name]
-        reached = np.array([[hold.x, hold.y, hold.yaw] for hold in own])
-        # For every step, how many swings this foot has behind it, and whether it swings now.
+        places = np.array([[hold.x, hold.y, hold.yaw] for hold in own])
         swings = np.array([any(hold.step == k for hold in own) for k in range(steps)])
-        before = np.cumsum(swings) - swings
-        origin, way = reached[before], (reached[before + swings] - reached[before])
-        moving = swings[n]
-        along_way = [p[:, None] * way[n] for p in (progress.value, progress.rate, progress.acceleration)]
-        up = [np.where(moving, h, 0.0) for h in (height.value, height.rate, height.acceleration)]
-        flat = [origin[n] + along_way[0], along_way[1], along_way[2]]
-        motions[foot.name] = Motion(
-            *(np.column_stack([p[:, :2], h, p[:, 2]]) for p, h in zip(flat, up, strict=True))
-        )
-        bears.append(~(moving & in_air))
+        before = np.cumsum(swings) - swings  # swings that a step finds behind it
+        origin, target = places[before][n], places[before + swings][n]
+        moving = swings[n] & in_air
+        stands = np.where(landed[:, None], target, origin)
+        motions[foot.name] = _swung(origin, target - origin, progress, height, moving, stands)
+        bears.append(~moving)
     return motions, np.column_stack(bears)
+
+
+def _swung(
+    origin: Array, way: Array, progress: Motion, height: Motion, moving: NDArray[np.bool_], stands: Array
+) -> Motion:
+    """x, y, z, yaw (T, 4): from ``origin`` along ``way`` (x, y, yaw) while moving, else on ``stands``."""
+
+    def joined(flat: Array, up: Array, still: Array) -> Array:
+        flat = np.where(moving[:, None], flat, still)
+        return np.column_stack([flat[:, :2], np.where(moving, up, 0.0), flat[:, 2]])
+
+    rest = np.zeros_like(stands)
+    return Motion(
+        joined(origin + progress.value[:, None] * way, height.value, stands),
+        joined(progress.rate[:, None] * way, height.rate, rest),
+        joined(progress.acceleration[:, None] * way, height.acceleration, rest),
+    )

@@ -15,7 +15,7 @@ def hands_motion(gait: Gait, stance: Stance, waist: Motion, phase: Motion) -> di
     """World motion (T, 3) of every hand by name; positions only.
 
     ``hand_forward`` [m] moves the hand on the side of the swinging foot, and the other one oppositely
-    (Bioloid paper, eq. 16-17, g = (-1)^n); ``hand_raise`` [m] lifts both above ``hand_drop`` below the
+    (walking paper, eq. 16-17, g = (-1)^n); ``hand_raise`` [m] lifts both above ``hand_drop`` below the
     shoulder (eq. 18). Without these channels the hands rest there. Periodic C2 cubics: they overshoot the
     paper's held ends by 4 % (1 mm), where holding them would let the acceleration jump.
     """

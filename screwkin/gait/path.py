@@ -53,7 +53,7 @@ class Path:
 def path_of(gait: Gait) -> Path:
     """The path of a gait: half a swing's displacement per step.
 
-    The waist starts over x = stride/4 between the feet (alternate: Bioloid paper, the right foot at 0, the
+    The waist starts over x = stride/4 between the feet (alternate: walking paper, the right foot at 0, the
     left at stride/2) or over 0 (close: the feet side by side).
     """
     start = 0.25 * gait.stride if gait.footholds == "alternate" else 0.0

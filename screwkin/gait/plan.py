@@ -81,7 +81,7 @@ def plan(gait: Gait, stance: Stance, steps: int) -> Plan:
         GaitError: another kind of gait, a swing below the floor, too many samples, or numbers too large.
         NoSolutionError: the soles overlap.
 
-    Source: Bioloid paper, eq. 16-24, generalised to arcs and to stepping sideways.
+    Source: walking paper (docs/papers.md, A), eq. 16-24, generalised to arcs and to stepping sideways.
     """
     steps = _whole(steps)
     if gait.kind != "geometric":

@@ -46,6 +46,9 @@ NUMBERS: Mapping[str, float | None] = {
 }
 """Parameters that are numbers, with their defaults; None: the file must say it."""
 
+FLAT = (*TEXTS, *CHOICES, *NUMBERS)
+"""Every key of the table ``[gait]``."""
+
 _POSITIVE = ("Tc", "lift", "waist_height", "hand_drop", "rate")
 _TABLES = ("gait", "parameters", "channel", "waist")
 
@@ -162,10 +165,10 @@ def _tables(document: Mapping[str, Any], faults: list[Fault]) -> dict[str, dict[
 
 def _flat(table: Mapping[str, Any], faults: list[Fault]) -> dict[str, Any]:
     """The table ``[gait]`` with defaults filled in, texts and choices checked, numbers still as written."""
-    row, known = "[gait]", (*TEXTS, *CHOICES, *NUMBERS)
+    row = "[gait]"
     for key in table:
-        if key not in known:
-            fix = f"{near(key, known)}Valid: {', '.join(known)}; numbers of your own go to [parameters]"
+        if key not in FLAT:
+            fix = f"{near(key, FLAT)}Valid: {', '.join(FLAT)}; numbers of your own go to [parameters]"
             faults.append(Fault(row, key, "unknown key", fix))
     flat: dict[str, Any] = {}
     for key in TEXTS:
@@ -180,26 +183,27 @@ def _flat(table: Mapping[str, Any], faults: list[Fault]) -> dict[str, Any]:
             found = f"{flat[key]!r} is not understood"
             faults.append(Fault(row, key, found, f"Valid: {', '.join(choices)}"))
     for key, default in NUMBERS.items():
-        if key not in table and default is None:
+        if key in table or default is not None:
+            flat[key] = table.get(key, default)
+        else:
             faults.append(Fault(row, key, "missing", "Give a number"))
-        flat[key] = table.get(key, default)
     return flat
 
 
 def _raw_numbers(flat: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: flat[key] for key in NUMBERS if flat[key] is not None} | {
-        key: value for key, value in own.items() if key not in flat
+    return {key: flat[key] for key in NUMBERS if key in flat} | {
+        key: value for key, value in own.items() if key not in FLAT
     }
 
 
 def _numbers(flat: Mapping[str, Any], own: Mapping[str, Any], faults: list[Fault]) -> dict[str, float | None]:
     """Values of all numeric parameters; None for a faulty one."""
     for key in own:
-        if key in flat:
+        if key in FLAT:
             found = f"{key!r} is a parameter of [gait]"
             faults.append(Fault("[parameters]", key, found, "Set it there, or choose another name"))
     values, wrong = resolve_parameters(_raw_numbers(flat, own), row="[gait]")
-    faults += [fault if fault.key in flat else _moved(fault, "[parameters]") for fault in wrong]
+    faults += [fault if fault.key in NUMBERS else _moved(fault, "[parameters]") for fault in wrong]
     numbers = {name: None if value is None else float(value) for name, value in values.items()}
     for key in (*_POSITIVE, "ramp"):
         value, least = numbers.get(key), "at least 0" if key == "ramp" else "above 0"

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 _LISTS = {"channel": 2, "waist": 1}  # tables of lists, and how many names lead to a list
 
 
@@ -21,6 +23,8 @@ def place(document: dict[str, Any], key: str, value: Any) -> bool:
     Keys: a parameter; ``channel.NAME.at`` or ``.value`` and ``waist.NAME``, with a list or its text
     ``"[0, lift/2, lift]"``; or one entry of such a list, by its number from 0: ``channel.NAME.value.2``.
     """
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
     for table in ("gait", "parameters"):
         if key in document[table]:
             document[table][key] = value

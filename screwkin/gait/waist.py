@@ -30,7 +30,7 @@ def waist_path(gait: Gait, steps: int) -> WaistPath:
     """The waist's path of a gait over a number of steps.
 
     Free if the gait has coefficients for it, else C2 cubics through the key points of ``waist_progress`` and
-    ``waist_side`` (Bioloid paper, eq. 23-24). These pass the inner key points: to rest there would put spikes
+    ``waist_side`` (walking paper, eq. 23-24). These pass the inner key points: to rest there would put spikes
     of decimetres into the ZMP. Sides are told towards the foot that supports; ``sway`` multiplies them.
     """
     if gait.waist:
