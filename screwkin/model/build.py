@@ -65,7 +65,7 @@ def all_joints(rows: Rows, mirrored: Sequence[Mirrored], around: Collection[str]
 
 
 def _joint(row: JointRow) -> Joint:
-    pitch = INFINITE if row.type == "prismatic" else row.pitch if row.type == "helical" else 0
+    pitch = INFINITE if row.type == "prismatic" else row.pitch
     screw = Screw(row.s, row.s0, pitch)
     return Joint(
         row.name, row.parent, row.child, row.type, screw, row.lower, row.upper, row.velocity, row.effort

@@ -83,7 +83,7 @@ def _sole(sole: SoleRow) -> Iterator[tuple[str, str, str]]:
     if (bends < 0).all() and round(turns) == -1:
         yield "corners", "run clockwise seen from above", "Reverse their order"
     elif (bends <= 0).any() or round(turns) != 1:
-        fix = "Write the corners of a convex polygon in order, counter-clockwise seen from above"
+        fix = "Write the corners of a convex polygon once each, counter-clockwise seen from above"
         yield "corners", "are not convex", fix
     elif np.linalg.svd(corners - corners.mean(axis=0), compute_uv=False)[2] > _FLAT:
         yield "corners", "do not lie in one plane", "A sole is flat: give its corners in one plane"

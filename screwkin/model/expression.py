@@ -95,7 +95,7 @@ def evaluate(value: object, names: Mapping[str, Scalar]) -> Scalar:
             raise
         fix = "Keep sqrt to numbers >= 0, asin and acos to [-1, 1], fractional powers to numbers >= 0"
         raise ExpressionError(f"{told} has no real value", fix) from None
-    return result if is_symbolic(result) and not result.is_number else _finite(result, told)
+    return result if symbolic and _is_open(result) else _finite(result, told)
 
 
 def names_in(value: object) -> tuple[str, ...]:
@@ -157,6 +157,13 @@ def _wrong_name(name: str) -> tuple[str, str] | None:
     if not name.isidentifier() or not name.isascii():
         return f"{name!r} cannot be used in a formula", "Use letters, digits and _, beginning with a letter"
     return None
+
+
+def _is_open(result: Scalar) -> bool:
+    """True for an expression that still has a symbol in it, and no infinity."""
+    import sympy
+
+    return bool(sympy.sympify(result).free_symbols) and not result.has(sympy.zoo, sympy.nan, sympy.oo)
 
 
 def _finite(number: Any, told: str) -> float:

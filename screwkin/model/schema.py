@@ -94,7 +94,7 @@ class JointRow(Row):
     type: JointType = Field(description='"revolute", "prismatic" or "helical"')
     s: Unit = Field(description="unit vector [x, y, z] of its axis")
     s0: Point = Field(description="a point [x, y, z] of its axis, in m")
-    pitch: Number = Field(None, description="advance in m/rad, for a helical joint only")
+    pitch: Number = Field(0, description="advance in m/rad, for a helical joint only")
     lower: Value = Field(-math.inf, description="lower limit in rad or m")
     upper: Value = Field(math.inf, description="upper limit in rad or m")
     velocity: Positive = Field(math.inf, description="greatest speed in rad/s or m/s")

@@ -76,7 +76,8 @@ def _posture_faults(rows: Rows, joints: Sequence[Joint], known: Sequence[str]) -
                 fix = f"{near(name, known)}Joints: {listed(known)}"
                 yield Fault(where, f"q.{name}", f"there is no joint {name!r}", fix)
         for joint in joints:
-            yield from _limit_faults(where, joint, row.q)
+            if joint.lower <= joint.upper:  # else told already
+                yield from _limit_faults(where, joint, row.q)
 
 
 def _limit_faults(where: str, joint: Joint, q: Mapping[str, float]) -> Iterator[Fault]:
