@@ -79,6 +79,8 @@ name = "home"
 base_height = 0.2
 q = { right_hip = 0.5, left_hip = 0.5 }
 """
+HIP, KNEE = "[[joint]] 1 'right_hip'", "[[joint]] 2 'right_knee'"
+"""Where the rows of its joints stand."""
 
 FOURBAR = """
 [robot]
