@@ -2,7 +2,8 @@
 
 A chain is a tuple of couplings: translations ``px py pz`` along world axes, each at most once, then rotations
 ``rx ry rz``, each at most once, about axes carried by the rotations before. 3P3R is the chain of space, PPR
-that of the plane; any other selection and order of rotations makes a chain too.
+that of the plane; any other selection and order of rotations makes a chain too. What a chain without all six
+couplings cannot move it holds: a planar chain stays at the height where its body is in the zero pose.
 Source: Campos et al. (2005), paper A section 2.3.
 """
 
@@ -13,7 +14,7 @@ from collections.abc import Sequence
 from screwkin import scalar
 from screwkin.errors import InputError
 from screwkin.scalar import Scalar
-from screwkin.se3 import UNTURNED, ZERO, Pose, Rotation, Twist, Vector, X, Y, Z, cross, rotate
+from screwkin.se3 import IDENTITY, UNTURNED, ZERO, Pose, Rotation, Twist, Vector, X, Y, Z, cross, rotate
 
 SPATIAL = ("px", "py", "pz", "rx", "ry", "rz")
 PLANAR = ("px", "py", "rz")
@@ -50,25 +51,39 @@ def rotations(chain: Sequence[str]) -> list[str]:
     return given + [a for a in "xyz" if a not in given]
 
 
-def chain_pose(chain: Sequence[str], values: Sequence[Scalar]) -> Pose:
+def held_pose(chain: Sequence[str], home: Pose) -> Pose:
+    """What the couplings that a chain lacks hold: the body's pose when the chain's coordinates are zero.
+
+    ``home`` is a pose of the body that the chain passes through; a chain of space holds nothing.
+    """
+    p = Vector(*(0 if f"p{a}" in chain else c for a, c in zip("xyz", home.p, strict=True)))
+    turning = [c for c in chain if c[0] == "r"]
+    if len(turning) == 3:
+        return Pose(UNTURNED, p)
+    turned = chain_pose(turning, chain_coordinates(turning, home)).R
+    return Pose(turned.T @ home.R, p)
+
+
+def chain_pose(chain: Sequence[str], values: Sequence[Scalar], held: Pose = IDENTITY) -> Pose:
     """Pose of the body at the end of the chain, from the chain's coordinates [m, rad]."""
-    p, R = ZERO, UNTURNED
+    p, R = held.p, UNTURNED
     for coupling, value in zip(chain, values, strict=True):
         axis = AXES[coupling[1]]
         if coupling[0] == "p":
             p = p + axis * value
         else:
             R = R @ rotate(axis, value)
-    return Pose(R, p)
+    return Pose(R @ held.R, p)
 
 
-def chain_coordinates(chain: Sequence[str], pose: Pose) -> list[Scalar]:
+def chain_coordinates(chain: Sequence[str], pose: Pose, held: Pose = IDENTITY) -> list[Scalar]:
     """The chain's coordinates [m, rad] at a pose: the inverse of ``chain_pose`` where the chain reaches it.
 
     Rotations are Tait-Bryan angles, the middle one within +-90 degrees; there the chain is singular.
     """
     i, j, k = (_INDEX[a] for a in rotations(chain))
-    columns = (tuple(pose.R.x), tuple(pose.R.y), tuple(pose.R.z))
+    R = pose.R @ held.R.T
+    columns = (tuple(R.x), tuple(R.y), tuple(R.z))
 
     def entry(row: int, column: int) -> Scalar:
         return columns[column][row]
@@ -83,11 +98,17 @@ def chain_coordinates(chain: Sequence[str], pose: Pose) -> list[Scalar]:
 
 
 def chain_twists(chain: Sequence[str], R: Rotation, p: Vector) -> list[Twist]:
-    """Normalised screws of the chain's couplings when its body has orientation R and stands at p.
+    """Normalised screws of the chain's couplings when they have turned its body by R and it stands at p.
 
     World axes; p and the twists are told from the same point.
     """
-    angles = iter(chain_coordinates([c for c in chain if c[0] == "r"], Pose(R, ZERO)))
+    turning = [c for c in chain if c[0] == "r"]
+    return chain_screws(chain, chain_coordinates(turning, Pose(R, ZERO)), p)
+
+
+def chain_screws(chain: Sequence[str], angles: Sequence[Scalar], p: Vector) -> list[Twist]:
+    """The same from the chain's rotation coordinates [rad], in their order."""
+    following = iter(angles)
     turned, twists = UNTURNED, []
     for coupling in chain:
         axis = AXES[coupling[1]]
@@ -96,5 +117,5 @@ def chain_twists(chain: Sequence[str], R: Rotation, p: Vector) -> list[Twist]:
             continue
         s = turned @ axis
         twists.append(Twist(s, cross(p, s)))
-        turned = turned @ rotate(axis, next(angles))
+        turned = turned @ rotate(axis, next(following))
     return twists

@@ -13,9 +13,10 @@ from functools import cached_property
 import numpy as np
 
 from screwkin.mechanism import graph as graphs
-from screwkin.mechanism.chains import SPATIAL, check_chain
+from screwkin.mechanism.chains import SPATIAL, check_chain, held_pose
 from screwkin.mechanism.graph import Graph, Integers
 from screwkin.model.robot import Limb, Robot
+from screwkin.se3 import IDENTITY, Pose
 
 FLOOR = "floor"
 WAIST = "waist"
@@ -69,6 +70,12 @@ class Mechanism:
     def circuit_matrix(self) -> Integers:
         """(circuits, couplings) of -1, 0, 1."""
         return graphs.circuit_matrix(self.graph)
+
+    def held(self, chain: VirtualChain, base: Pose) -> Pose:
+        """What a chain without all six couplings holds: its tip's place in the zero pose, on a fixed base."""
+        if chain.limb is None or self.robot.base == "floating":
+            return IDENTITY
+        return held_pose(chain.couplings, base @ chain.limb.frame)
 
     @cached_property
     def closings(self) -> tuple[Closing, ...]:

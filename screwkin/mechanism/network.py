@@ -38,7 +38,8 @@ def coupling_twists(
     twists = dict(zip(robot.joint_names, joint_twists(robot, D, turned), strict=True))
     for chain in mechanism.chains:
         body = turned if chain.limb is None else turned @ frame_pose(robot, D, chain.limb.tip)
-        twists |= zip(chain.names, chain_twists(chain.couplings, body.R, body.p), strict=True)
+        R_chain = body.R @ mechanism.held(chain, turned).R.T
+        twists |= zip(chain.names, chain_twists(chain.couplings, R_chain, body.p), strict=True)
     return [at(point, twists[name]) for name in mechanism.couplings]
 
 

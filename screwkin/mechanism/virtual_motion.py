@@ -79,7 +79,8 @@ def primary_motion(
     D = link_displacements(mechanism.robot, q)
     motion: dict[str, Scalar] = {}
     for chain in imposing_chains(mechanism):
-        R = T.R if chain.limb is None else T.R @ frame_pose(mechanism.robot, D, chain.name).R
+        body = T if chain.limb is None else T @ frame_pose(mechanism.robot, D, chain.name)
+        R = body.R @ mechanism.held(chain, T).R.T
         twist = twists[chain.name]
         if accelerations is None:
             values = chain_rates(chain.couplings, R, twist.omega, twist.v)

@@ -55,7 +55,8 @@ def coordinates_from_state(mechanism: Mechanism, T: Pose, q: Sequence[Scalar]) -
     values = dict(zip(robot.joint_names, q, strict=True))
     for chain in mechanism.chains:
         body = T if chain.limb is None else T @ frame_pose(robot, D, chain.limb.tip)
-        values |= zip(chain.names, chain_coordinates(chain.couplings, body), strict=True)
+        coordinates = chain_coordinates(chain.couplings, body, mechanism.held(chain, T))
+        values |= zip(chain.names, coordinates, strict=True)
     return [values[name] for name in mechanism.couplings]
 
 
@@ -81,7 +82,8 @@ def closure_errors(mechanism: Mechanism, coordinates: Sequence[Scalar], fixed: P
     for chain in mechanism.chains:
         if chain.limb is not None:
             values = [coordinates[mechanism.position[name]] for name in chain.names]
-            ends.append((base @ frame_pose(robot, D, chain.limb.tip), chain_pose(chain.couplings, values)))
+            end = chain_pose(chain.couplings, values, mechanism.held(chain, base))
+            ends.append((base @ frame_pose(robot, D, chain.limb.tip), end))
     for closure in robot.closures:
         a, b = carried[closure.link_a] @ closure.frame_a, carried[closure.link_b] @ closure.frame_b
         ends.append((base @ a, base @ b))
