@@ -247,8 +247,17 @@ def test_every_name_of_the_root_resolves_and_is_documented():
         assert getattr(screwkin, name).__doc__, name
 
 
-def test_importing_the_package_and_its_command_line_loads_nothing_slow():
-    code = f"import sys, screwkin, screwkin.cli; print(*({set(SLOW_TO_START)} & set(sys.modules)))"
+@pytest.mark.parametrize("arguments", [[], ["--help"], ["robots"], ["gaits"]])
+def test_starting_the_command_line_loads_nothing_slow(arguments):
+    """No argument stands for the bare import of package and command line."""
+    code = f"""
+import contextlib, io, sys
+import screwkin, screwkin.cli
+if {arguments}:
+    with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()):
+        screwkin.cli.main({arguments})
+print(*({set(SLOW_TO_START)} & set(sys.modules)))
+"""
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=CHECKOUT, capture_output=True, text=True, timeout=60, check=False
     )
