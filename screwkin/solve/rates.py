@@ -81,8 +81,11 @@ def solve_secondary(mechanism: Mechanism, N: Array, right: Array) -> SecondarySo
             x = (np_.linalg.pinv(A, rcond=RANK_TOLERANCE) @ b[..., None])[..., 0]
         parts += [(i, x[..., k]) for k, i in enumerate(inside)]
         sigmas.append(sigma)
-    values = np_.stack([x for _, x in sorted(parts, key=lambda part: part[0])], axis=-1)
     names = tuple(block_name(mechanism, circuits) for circuits, _ in mechanism.blocks)
+    if not parts:  # nothing follows: a tree without tips
+        nothing = np_.zeros((*right.shape[:-1], 0))
+        return SecondarySolution(nothing, nothing, names)
+    values = np_.stack([x for _, x in sorted(parts, key=lambda part: part[0])], axis=-1)
     return SecondarySolution(values, np_.stack(sigmas, axis=-1), names)
 
 
@@ -131,12 +134,8 @@ def singular_values(mechanism: Mechanism, N: Array) -> Array:
     """Smallest singular value (..., blocks) of every limb's or loop's secondary block, length-normalised."""
     scaled = normalised(N, characteristic_length(mechanism.robot))
     columns = mechanism.secondary_columns
-    return np.stack(
-        [
-            np.linalg.svd(
-                scaled[..., block_rows(circuits), :][..., [columns[i] for i in inside]], compute_uv=False
-            )[..., -1]
-            for circuits, inside in mechanism.blocks
-        ],
-        axis=-1,
-    )
+    sigma = np.empty((*N.shape[:-2], len(mechanism.blocks)))
+    for k, (circuits, inside) in enumerate(mechanism.blocks):
+        A = scaled[..., block_rows(circuits), :][..., [columns[i] for i in inside]]
+        sigma[..., k] = np.linalg.svd(A, compute_uv=False)[..., -1]
+    return sigma
