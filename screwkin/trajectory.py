@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from screwkin.errors import InputError, TrajectoryError
 from screwkin.files import atomic_write, atomic_write_bytes, npz_bytes, read_npz
+from screwkin.se3 import as_array, rotation_exp, rotation_from_array, rotation_log
 
 Array = NDArray[np.float64]
 
@@ -118,16 +119,23 @@ class Trajectory:
 
         Before the first and after the last sample the motion rests there.
         """
+        return _hermite(self.time, self.q, self.qd, np.asarray(times, dtype=float))
+
+    def base_sampled(self, times: Array) -> Array:
+        """Planned base poses at other times, (..., 4, 4).
+
+        The origin moves on the cubic Hermite spline of its positions and velocities, the orientation turns
+        evenly from sample to sample.
+        """
         times = np.asarray(times, dtype=float)
-        inside = np.clip(times, self.time[0], self.time[-1])
-        i = np.clip(np.searchsorted(self.time, inside, side="right") - 1, 0, self.samples - 2)
-        h = (self.time[i + 1] - self.time[i])[..., None]
-        u = (inside - self.time[i])[..., None] / h
-        q0, q1, d0, d1 = self.q[i], self.q[i + 1], h * self.qd[i], h * self.qd[i + 1]
-        rise, a, b = q1 - q0, d0, d1
-        q = q0 + u * (a + u * (3 * rise - 2 * a - b + u * (a + b - 2 * rise)))
-        qd = (a + u * (2 * (3 * rise - 2 * a - b) + 3 * u * (a + b - 2 * rise))) / h
-        return q, np.where((times == inside)[..., None], qd, 0.0)
+        T = np.zeros((*times.shape, 4, 4))
+        T[..., 3, 3] = 1.0
+        T[..., :3, 3] = _hermite(self.time, self.T_world_base[:, :3, 3], self.base_twist[:, 3:], times)[0]
+        i, u, _ = _places(self.time, times)
+        before = rotation_from_array(self.T_world_base[i, :3, :3])
+        turned = rotation_log(before.T @ rotation_from_array(self.T_world_base[i + 1, :3, :3]))
+        T[..., :3, :3] = as_array(before @ rotation_exp(turned * u))
+        return T
 
     def save(self, path: str | Path) -> Path:
         """Write ``.npz``, ``.csv`` or ``.json``, by the suffix of the path.
@@ -179,6 +187,26 @@ def sha256_of(path: str | Path) -> str:
         return hashlib.sha256(Path(path).read_bytes()).hexdigest()
     except OSError as error:
         raise TrajectoryError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def _places(knots: Array, times: Array) -> tuple[NDArray[np.intp], Array, Array]:
+    """For every time: index of the knot before it, how far it is towards the next (0 to 1), and their gap."""
+    inside = np.clip(times, knots[0], knots[-1])
+    i = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, len(knots) - 2)
+    gap = knots[i + 1] - knots[i]
+    return i, (inside - knots[i]) / gap, gap
+
+
+def _hermite(knots: Array, values: Array, rates: Array, times: Array) -> tuple[Array, Array]:
+    """Cubic Hermite spline and its derivative; at rest before the first knot and after the last."""
+    i, u, gap = _places(knots, times)
+    u, h = u[..., None], gap[..., None]
+    a, b, rise = h * rates[i], h * rates[i + 1], values[i + 1] - values[i]
+    square, cube = 3 * rise - 2 * a - b, a + b - 2 * rise
+    value = values[i] + u * (a + u * (square + u * cube))
+    rate = (a + u * (2 * square + 3 * u * cube)) / h
+    moving = (times >= knots[0]) & (times <= knots[-1])
+    return value, np.where(moving[..., None], rate, 0.0)
 
 
 def _numbers(name: str, value: Any, shape: tuple[int, ...], faults: list[str]) -> Array:

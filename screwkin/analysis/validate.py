@@ -1,0 +1,242 @@
+"""Does the planned walk stand up to physics? A verdict with its reasons."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from screwkin.errors import InputError, UnknownNameError
+from screwkin.model.robot import Robot
+from screwkin.sim.backend import Array, Backend
+from screwkin.sim.camera import Camera, Picture
+from screwkin.sim.kinematic import KinematicBackend
+from screwkin.sim.measure import WINDOW, Slip, ZmpRecord, slip, speed_use, torque_use, zmp_record
+from screwkin.sim.render import pictures
+from screwkin.sim.run import Run, Schedule, simulate
+from screwkin.trajectory import Trajectory
+
+Engine = Literal["pybullet", "kinematic"]
+ENGINES: tuple[Engine, ...] = ("pybullet", "kinematic")
+_SERIES = ("run", "zmp", "pictures")
+
+
+@dataclass(frozen=True)
+class Criteria:
+    """When a walk passes: lengths in m; shares of the planned distance and of the servos' torque."""
+
+    end_error: float = 0.010
+    end_error_share: float = 0.05
+    slip: float = 0.010
+    torque_share: float = 0.999
+    schedule: Schedule = field(default_factory=Schedule)
+
+
+@dataclass(frozen=True, eq=False)
+class Validation:
+    """The verdict. ``to_dict`` gives its numbers as JSON data; series and pictures are for reports.
+
+    zmp_rms_mm and zmp_max_mm: contact ZMP against the planned one, the larger of x and y; the ``_xy`` fields
+    tell both, and ankle_rms_xy_mm the ankle sensors against the contacts; None where nothing was measured.
+    """
+
+    passed: bool
+    reasons: tuple[str, ...]
+    warnings: tuple[str, ...]
+    engine: str
+    fell: bool
+    fell_at: float | None
+    distance: float
+    planned_distance: float
+    end_error_mm: float
+    end_turn_deg: float
+    zmp_rms_mm: float | None
+    zmp_max_mm: float | None
+    zmp_rms_xy_mm: tuple[float, float] | None
+    zmp_max_xy_mm: tuple[float, float] | None
+    ankle_rms_xy_mm: tuple[float, float] | None
+    min_margin_mm: float
+    slip_mm: float
+    slip_total_mm: float
+    slip_turn_deg: float
+    max_tilt_deg: float
+    min_base_height: float
+    torque_use: dict[str, float]
+    speed_use: dict[str, float]
+    trajectory_sha256: str
+    run: Run
+    zmp: ZmpRecord
+    pictures: tuple[Picture, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """All but the series, as JSON data for ``validation.json``."""
+        values = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in _SERIES}
+        return {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
+
+
+def validate(
+    robot: Robot,
+    trajectory: Trajectory,
+    engine: Engine = "pybullet",
+    *,
+    gui: bool = False,
+    camera: Camera | None = None,
+    criteria: Criteria | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Validation:
+    """Play the trajectory in a simulator and judge what happened.
+
+    Args:
+        robot: the robot of the trajectory.
+        trajectory: what to play.
+        engine: ``pybullet`` (bodies, motors, contacts) or ``kinematic`` (perfect tracking; never passes).
+        gui: show a window, in real time.
+        camera: take its pictures of what happens; they need neither display nor simulator.
+        criteria: what a walk must keep to.
+        progress: called now and then with the share done.
+
+    Raises:
+        InputError: unknown engine, or a trajectory of another robot.
+        MissingDependencyError: the engine is not installed.
+    """
+    if engine not in ENGINES:
+        raise UnknownNameError("engine", engine, ENGINES)
+    _check_fit(robot, trajectory)
+    rule = criteria or Criteria()
+    backend = _opened(robot, engine, gui)
+    try:
+        run = simulate(robot, trajectory, backend, rule.schedule, progress)
+    finally:
+        backend.close()
+    taken = film(robot, trajectory, run, camera) if camera else ()
+    return replace(judged(robot, trajectory, run, rule), pictures=taken)
+
+
+def film(robot: Robot, trajectory: Trajectory, run: Run, camera: Camera) -> tuple[Picture, ...]:
+    """Pictures of a run at even times of the trajectory, up to the end of what was seen."""
+    times = np.linspace(trajectory.time[0], trajectory.time[-1], camera.pictures)
+    rows = np.searchsorted(run.time, times[times <= run.time[-1] + 1e-9] - 1e-9)
+    return tuple(pictures(robot, run.time[rows], run.T_world_base[rows], run.q[rows], camera))
+
+
+def _opened(robot: Robot, engine: Engine, gui: bool) -> Backend:
+    if engine == "kinematic":
+        return KinematicBackend(robot)
+    from screwkin.sim.pybullet import PyBulletBackend
+
+    return PyBulletBackend(robot, gui=gui)
+
+
+def _check_fit(robot: Robot, trajectory: Trajectory) -> None:
+    if trajectory.joint_names != robot.joint_names:
+        raise InputError(
+            f"the trajectory moves the joints {', '.join(trajectory.joint_names)}, but robot {robot.name} "
+            f"has {', '.join(robot.joint_names)}; give the robot it was made for"
+        )
+    legs = [limb.tip for limb in robot.limbs if limb.kind == "leg"]
+    missing = [foot for foot in legs if foot not in trajectory.feet]
+    if missing:
+        raise InputError(f"the trajectory tells no contact of {', '.join(missing)} of robot {robot.name}")
+
+
+def judged(robot: Robot, trajectory: Trajectory, run: Run, criteria: Criteria) -> Validation:
+    """The verdict on a finished run."""
+    legs = tuple(limb.tip for limb in robot.limbs if limb.kind == "leg")
+    zmp, slipped = zmp_record(run, trajectory), slip(run, trajectory, legs)
+    rms, largest = _deviation(zmp.contact - zmp.planned)
+    ankle, _ = _deviation(zmp.ankle - zmp.contact)
+    last, planned = run.T_world_base[-1], trajectory.T_world_base
+    reached = _distance(trajectory.T_world_base[0], last)
+    torque, speed = torque_use(run, robot), speed_use(trajectory, robot)
+    facts = Validation(
+        passed=False,
+        reasons=(),
+        warnings=_warnings(robot, run, slipped, speed),
+        engine=run.engine,
+        fell=run.fallen_at is not None,
+        fell_at=run.fallen_at,
+        distance=reached,
+        planned_distance=_distance(planned[0], planned[-1]),
+        end_error_mm=1e3 * _distance(planned[-1], last),
+        end_turn_deg=float(np.rad2deg(_turn(planned[-1], last))),
+        zmp_rms_mm=max(rms) if rms else None,
+        zmp_max_mm=max(largest) if largest else None,
+        zmp_rms_xy_mm=rms,
+        zmp_max_xy_mm=largest,
+        ankle_rms_xy_mm=ankle,
+        min_margin_mm=1e3 * float(trajectory.margin.min()),
+        slip_mm=1e3 * slipped.largest,
+        slip_total_mm=1e3 * slipped.total,
+        slip_turn_deg=float(np.rad2deg(slipped.turned)),
+        max_tilt_deg=float(np.rad2deg(run.tilt.max())),
+        min_base_height=float(run.T_world_base[:, 2, 3].min()),
+        torque_use=dict(zip(robot.joint_names, torque.tolist(), strict=True)),
+        speed_use=dict(zip(robot.joint_names, speed.tolist(), strict=True)),
+        trajectory_sha256=trajectory.sha256,
+        run=run,
+        zmp=zmp,
+    )
+    reasons = _reasons(facts, criteria)
+    return replace(facts, passed=not reasons, reasons=reasons)
+
+
+def _reasons(facts: Validation, rule: Criteria) -> tuple[str, ...]:
+    """Every criterion that failed, with its number and its bound."""
+    reasons = []
+    if facts.engine == "kinematic":
+        reasons.append("engine kinematic simulates no forces and confirms nothing; use pybullet")
+    if facts.fell_at is not None:
+        reasons.append(
+            f"fell at {facts.fell_at:.2f} s: tilt {facts.max_tilt_deg:.0f} deg (limit "
+            f"{np.rad2deg(rule.schedule.fallen_tilt):.0f}), base down to {facts.min_base_height:.3f} m"
+        )
+    allowed = 1e3 * max(rule.end_error, rule.end_error_share * facts.planned_distance)
+    if facts.end_error_mm > allowed:
+        reasons.append(f"end error {facts.end_error_mm:.1f} mm, allowed {allowed:.1f} mm")
+    if facts.slip_mm > 1e3 * rule.slip:
+        reasons.append(f"a stance foot slips {facts.slip_mm:.1f} mm, allowed {1e3 * rule.slip:.1f} mm")
+    if facts.min_margin_mm < 0.0:
+        reasons.append(f"planned ZMP leaves the support polygon by {-facts.min_margin_mm:.1f} mm")
+    tired = [f"{name} {100 * use:.0f} %" for name, use in facts.torque_use.items() if use > rule.torque_share]
+    if tired:
+        reasons.append(f"torque at the servo's limit for {1e3 * WINDOW:.0f} ms: {', '.join(tired)}")
+    return tuple(reasons)
+
+
+def _warnings(robot: Robot, run: Run, slipped: Slip, speed: Array) -> tuple[str, ...]:
+    """What does not fail a walk but should be known."""
+    warnings = []
+    fast = [
+        f"{joint.name} {use * joint.velocity:.1f} of {joint.velocity:.1f} rad/s"
+        for joint, use in zip(robot.joints, speed, strict=True)
+        if use > 1.0
+    ]
+    if fast:
+        warnings.append(f"planned joint speed above the servo's: {', '.join(fast)}")
+    if run.touched:
+        warnings.append(f"links other than feet touched the floor: {', '.join(run.touched)}")
+    if slipped.turned > np.deg2rad(5.0):
+        warnings.append(f"a stance foot turns by {np.rad2deg(slipped.turned):.1f} deg")
+    return tuple(warnings)
+
+
+def _deviation(error: Array) -> tuple[tuple[float, float] | None, tuple[float, float] | None]:
+    """Root mean square and largest magnitude per axis [mm] of (M, 2) [m]; None without measurements."""
+    error = 1e3 * error[np.isfinite(error).all(axis=1)]
+    if not len(error):
+        return None, None
+    rms, largest = np.sqrt(np.mean(error**2, axis=0)), np.abs(error).max(axis=0)
+    return (float(rms[0]), float(rms[1])), (float(largest[0]), float(largest[1]))
+
+
+def _distance(a: Array, b: Array) -> float:
+    """Horizontal distance between two poses [m]."""
+    return float(np.hypot(*(b[:2, 3] - a[:2, 3])))
+
+
+def _turn(a: Array, b: Array) -> float:
+    """Difference of heading of two poses [rad], signed."""
+    between = a[:3, :3].T @ b[:3, :3]
+    return float(np.arctan2(between[1, 0], between[0, 0]))

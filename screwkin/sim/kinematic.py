@@ -1,0 +1,62 @@
+"""A robot that does exactly what it is told: no masses, no contacts. It serves tests and previews."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from screwkin.errors import InputError
+from screwkin.kinematics import positions
+from screwkin.model.robot import Robot
+from screwkin.model.state import State
+from screwkin.se3 import as_array, pose_from_array, unstack
+from screwkin.sim.backend import Array, Command, Observation
+
+
+class KinematicBackend:
+    """Perfect tracking of joints and base, without forces."""
+
+    name = "kinematic"
+
+    def __init__(self, robot: Robot, dt: float = 1e-3) -> None:
+        self.dt = dt
+        self._robot = robot
+        self._legs = [limb.tip for limb in robot.limbs if limb.kind == "leg"]
+        self._steps = 0
+        self._pose: Array | None = None
+        self._q = self._qd = np.zeros(len(robot.joints))
+
+    def reset(self, state: State) -> Observation:
+        """Place the robot at rest in a state, and time at 0."""
+        self._steps = 0
+        self._pose = np.array(state.T_world_base, dtype=float)
+        self._q = np.array(state.q, dtype=float)
+        self._qd = np.zeros_like(self._q)
+        return self.observe()
+
+    def step(self, command: Command) -> None:
+        """Follow the command at once: joints at the end of the step, base where the plan sees it."""
+        self._steps += 1
+        self._pose = np.array(command.T_world_base, dtype=float)
+        self._qd = np.array(command.qd, dtype=float)
+        self._q = np.array(command.q, dtype=float) + self.dt * self._qd
+
+    def observe(self) -> Observation:
+        """The present state."""
+        if self._pose is None:
+            raise InputError("the simulation has no state yet; call reset first")
+        base = pose_from_array(self._pose)
+        displacements = positions.link_displacements(self._robot, unstack(self._q))
+        feet = [base @ positions.frame_pose(self._robot, displacements, tip) for tip in self._legs]
+        return Observation(
+            time=self._steps * self.dt,
+            T_world_base=self._pose.copy(),
+            q=self._q.copy(),
+            qd=self._qd.copy(),
+            torque=np.zeros_like(self._q),
+            T_world_foot=as_array(feet) if feet else np.zeros((0, 4, 4)),
+            ankle_wrench=np.full((len(feet), 6), np.nan),
+            contacts=(),
+        )
+
+    def close(self) -> None:
+        """Nothing to give back."""

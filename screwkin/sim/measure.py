@@ -1,0 +1,128 @@
+"""What a run shows beside its plan: ZMP from contacts, slip, torque and speed against the servos."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from screwkin.model.robot import Robot
+from screwkin.sim.backend import Array
+from screwkin.sim.run import Run
+from screwkin.trajectory import Trajectory
+
+WINDOW = 0.05
+"""Averaging time of forces [s]: contact solvers shift force between corners from step to step."""
+
+
+@dataclass(frozen=True, eq=False)
+class ZmpRecord:
+    """ZMP measured and planned, averaged over the same windows; rows (M,) are told at their middle.
+
+    time (M,) [s]; contact (M, 2) from contact forces, planned (M, 2), ankle (M, 2) from the ankle sensors
+    [m]. A row is NaN where nothing presses on the floor.
+    """
+
+    time: Array
+    contact: Array
+    planned: Array
+    ankle: Array
+
+
+@dataclass(frozen=True)
+class Slip:
+    """Horizontal motion of soles that should stand still.
+
+    largest [m]: farthest a sole moves in the middle 80 % of one stance; total [m]: net motion of all whole
+    stances added up; turned [rad]: largest change of a sole's heading in the middle of one stance.
+    """
+
+    largest: float
+    total: float
+    turned: float
+
+
+def zmp_record(run: Run, trajectory: Trajectory, window: float = WINDOW) -> ZmpRecord:
+    """Contact, ankle and planned ZMP, all as force-weighted means over the same windows.
+
+    A step's forces change the rates of the step before into its own, so they belong to its start. Rows cover
+    the trajectory, up to a fall.
+    """
+    count = max(1, round(window / run.dt))
+    start = run.time - run.dt
+    kept = _before_fall(run)
+    if kept.sum() < count:
+        nothing = np.zeros((0, 2))
+        return ZmpRecord(np.zeros(0), nothing, nothing, nothing)
+    planned = np.stack([np.interp(start[kept], trajectory.time, axis) for axis in trajectory.zmp.T], axis=1)
+    middle = _window_mean(start[kept], count)
+    rows = (middle >= trajectory.time[0]) & (middle <= trajectory.time[-1])
+    return ZmpRecord(
+        time=middle[rows],
+        contact=_zmp(_window_mean(run.ground_wrench[kept], count))[rows],
+        planned=_window_mean(planned, count)[rows],
+        ankle=_zmp(_window_mean(run.ankle_wrench[kept].sum(axis=1), count))[rows],
+    )
+
+
+def slip(run: Run, trajectory: Trajectory, legs: tuple[str, ...]) -> Slip:
+    """How far soles move while the plan has them on the floor; ``legs`` names the run's feet."""
+    played = _before_fall(run) & (run.time >= trajectory.time[0]) & (run.time <= trajectory.time[-1])
+    sample = np.searchsorted(trajectory.time, run.time[played] + 1e-9, side="right") - 1
+    largest = total = turned = 0.0
+    for i, foot in enumerate(legs):
+        T = run.T_world_foot[played, i]
+        for first, last in _stretches(trajectory.contact[sample, trajectory.feet.index(foot)]):
+            total += float(np.linalg.norm(T[last - 1, :2, 3] - T[first, :2, 3]))
+            tenth = (last - first) // 10
+            middle = T[first + tenth : last - tenth]
+            away = np.linalg.norm(middle[:, :2, 3] - middle[0, :2, 3], axis=1)
+            heading = np.unwrap(np.arctan2(middle[:, 1, 0], middle[:, 0, 0]))
+            largest = max(largest, float(away.max()))
+            turned = max(turned, float(np.abs(heading - heading[0]).max()))
+    return Slip(largest, total, turned)
+
+
+def torque_use(run: Run, robot: Robot, window: float = WINDOW) -> Array:
+    """Share (n,) of every motor's torque limit: the largest window mean of its torque.
+
+    The simulated motor never exceeds its limit; a share of 1 means that it could not follow for that long.
+    """
+    count = max(1, round(window / run.dt))
+    torque = np.abs(run.torque[_before_fall(run) & (run.time >= 0.0)])
+    if len(torque) < count:
+        return np.zeros(len(robot.joints))
+    limit = np.array([joint.effort for joint in robot.joints])
+    return np.asarray(_window_mean(torque, count).max(axis=0) / limit)
+
+
+def speed_use(trajectory: Trajectory, robot: Robot) -> Array:
+    """Share (n,) of every servo's speed limit that the planned rates need."""
+    return np.asarray(
+        np.abs(trajectory.qd).max(axis=0) / np.array([joint.velocity for joint in robot.joints])
+    )
+
+
+def _before_fall(run: Run) -> NDArray[np.bool_]:
+    if run.fallen_at is None:
+        return np.ones(len(run.time), dtype=bool)
+    return np.asarray(run.time < run.fallen_at)
+
+
+def _window_mean(values: Array, count: int) -> Array:
+    """Means over all windows of ``count`` consecutive rows."""
+    summed = np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
+    return np.asarray((summed[count:] - summed[:-count]) / count)
+
+
+def _zmp(wrench: Array) -> Array:
+    """Point of the floor (K, 2) where a wrench about the world origin has no horizontal moment."""
+    pressing = np.where(wrench[:, 5] > 1e-6, wrench[:, 5], np.nan)
+    return np.stack([-wrench[:, 1] / pressing, wrench[:, 0] / pressing], axis=1)
+
+
+def _stretches(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and one-past-last index of every run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

@@ -1,0 +1,326 @@
+"""The robot in PyBullet: rigid bodies, motors and contacts. The only file that imports pybullet.
+
+Settings that matter, all measured: a step of 1 ms with 200 solver iterations (``numSubSteps`` would divide
+the reported contact forces); no damping of any kind; the default joint motors released; inertia as the table
+gives it; friction anchors. Without these a robot on both feet creeps, for the two legs and the floor close a
+loop whose inner forces the solver never settles: 0.1 deg per second of standing. Anchored friction gives way
+beyond the friction coefficient all the same. Every call names its client: simulations can run side by side.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from screwkin.errors import InputError, MissingDependencyError
+from screwkin.model.robot import Limb, Robot
+from screwkin.model.state import State
+from screwkin.model.urdf import urdf_frames, urdf_from_robot
+from screwkin.se3 import as_array
+from screwkin.sim.backend import Array, Command, Contact, Observation
+from screwkin.sim.camera import Camera
+
+UNLIMITED = 1e9
+"""Stands for an infinite effort [N m], which the solver cannot compute with."""
+
+
+@dataclass(frozen=True)
+class Physics:
+    """Settings of the simulation.
+
+    dt [s]; iterations of the constraint solver per step; friction between soles and floor; gains of the
+    joints' position control (dimensionless: the share of an error that one step removes); gravity [m/s^2].
+    """
+
+    dt: float = 1e-3
+    iterations: int = 200
+    friction: float = 1.0
+    position_gain: float = 0.5
+    velocity_gain: float = 1.0
+    gravity: float = 9.81
+
+
+@dataclass(frozen=True, eq=False)
+class _Foot:
+    """A leg's last link: PyBullet's index of it, its tip, the axis of the joint above, its mass [kg]."""
+
+    index: int
+    T_link_tip: Array
+    axis_in_inertial: Array
+    turns: bool
+    mass: float
+
+
+class PyBulletBackend:
+    """One robot on a flat floor in a physics client of its own."""
+
+    name = "pybullet"
+
+    def __init__(self, robot: Robot, physics: Physics | None = None, gui: bool = False) -> None:
+        """Connect and build the world.
+
+        Raises:
+            MissingDependencyError: pybullet is not installed.
+            InputError: the robot has loops or helical joints, a leg has nothing to stand on, or there is no
+                display for ``gui``.
+        """
+        self._robot = robot
+        self._physics = physics or Physics()
+        self.dt = self._physics.dt
+        _check_feet(robot)
+        urdf = urdf_from_robot(robot.with_inertia_floor())
+        self._p = _imported_pybullet()
+        self._client = _connected(self._p, gui)
+        self._here = {"physicsClientId": self._client}
+        self._steps = 0
+        self._began = time.monotonic() if gui else None
+        self._floor = self._make_floor()
+        self._body = self._load(urdf)
+        self._link_names = [robot.base_link, *(info[12].decode() for info in self._joint_infos())]
+        names = [info[1].decode() for info in self._joint_infos()]
+        self._joints = [names.index(name) for name in robot.joint_names]
+        self._efforts = [min(joint.effort, UNLIMITED) for joint in robot.joints]
+        self._release()
+        info = self._p.getDynamicsInfo(self._body, -1, **self._here)
+        self._T_base_inertial = self._pose(info[3], info[4])
+        self._T_inertial_base = np.linalg.inv(self._T_base_inertial)
+        self._feet = [self._foot(limb) for limb in robot.limbs if limb.kind == "leg"]
+
+    def _make_floor(self) -> int:
+        p, here, physics = self._p, self._here, self._physics
+        p.setGravity(0.0, 0.0, -physics.gravity, **here)
+        p.setPhysicsEngineParameter(
+            fixedTimeStep=physics.dt,
+            numSolverIterations=physics.iterations,
+            numSubSteps=0,
+            deterministicOverlappingPairs=1,
+            **here,
+        )
+        floor: int = p.createMultiBody(0.0, p.createCollisionShape(p.GEOM_PLANE, **here), **here)
+        # The coefficients of the two bodies are multiplied: the floor takes 1, the robot the wanted friction.
+        p.changeDynamics(floor, -1, lateralFriction=1.0, frictionAnchor=1, **here)
+        return floor
+
+    def _load(self, urdf: str) -> int:
+        p = self._p
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "robot.urdf"
+            path.write_text(urdf, encoding="utf-8")
+            body: int = p.loadURDF(
+                str(path),
+                flags=p.URDF_USE_INERTIA_FROM_FILE,
+                useFixedBase=self._robot.base == "fixed",
+                **self._here,
+            )
+        return body
+
+    def _joint_infos(self) -> list[Any]:
+        p = self._p
+        return [
+            p.getJointInfo(self._body, i, **self._here)
+            for i in range(p.getNumJoints(self._body, **self._here))
+        ]
+
+    def _release(self) -> None:
+        """Remove all that PyBullet adds by itself: damping of links and joints, and braking motors."""
+        p, here = self._p, self._here
+        for link in range(-1, len(self._joints)):
+            p.changeDynamics(
+                self._body,
+                link,
+                linearDamping=0.0,
+                angularDamping=0.0,
+                jointDamping=0.0,
+                lateralFriction=self._physics.friction,
+                frictionAnchor=1,
+                **here,
+            )
+        p.setJointMotorControlArray(
+            self._body, self._joints, p.VELOCITY_CONTROL, forces=[0.0] * len(self._joints), **here
+        )
+
+    def _foot(self, limb: Limb) -> _Foot:
+        robot, p = self._robot, self._p
+        index = self._link_names.index(limb.link) - 1
+        p.enableJointForceTorqueSensor(self._body, index, True, **self._here)
+        info = p.getDynamicsInfo(self._body, index, **self._here)
+        joint = robot.joints[robot.joint_above[limb.link]]
+        return _Foot(
+            index=index,
+            T_link_tip=as_array(urdf_frames(robot)[limb.link].inverse @ limb.frame),
+            axis_in_inertial=self._pose((0.0, 0.0, 0.0), info[4])[:3, :3].T @ as_array(joint.screw.s),
+            turns=joint.type == "revolute",
+            mass=info[0],
+        )
+
+    def _pose(self, position: Any, quat_xyzw: Any) -> Array:
+        a, b, c, d, e, f, g, h, i = self._p.getMatrixFromQuaternion(quat_xyzw)
+        x, y, z = position
+        return np.array([[a, b, c, x], [d, e, f, y], [g, h, i, z], [0.0, 0.0, 0.0, 1.0]])
+
+    def reset(self, state: State) -> Observation:
+        """Place the robot at rest in a state, and time at 0."""
+        p, here = self._p, self._here
+        T = np.asarray(state.T_world_base, dtype=float) @ self._T_base_inertial
+        p.resetBasePositionAndOrientation(self._body, T[:3, 3].tolist(), _quat_xyzw(T[:3, :3]), **here)
+        p.resetBaseVelocity(self._body, [0.0] * 3, [0.0] * 3, **here)
+        for index, q in zip(self._joints, np.asarray(state.q, dtype=float).tolist(), strict=True):
+            p.resetJointState(self._body, index, q, 0.0, **here)
+        self._steps = 0
+        if self._began is not None:
+            self._began = time.monotonic()
+        return self.observe()
+
+    def step(self, command: Command) -> None:
+        """Let one step pass, every joint under position and velocity control within its effort."""
+        p, n = self._p, len(self._joints)
+        p.setJointMotorControlArray(
+            self._body,
+            self._joints,
+            p.POSITION_CONTROL,
+            targetPositions=np.asarray(command.q).tolist(),
+            targetVelocities=np.asarray(command.qd).tolist(),
+            forces=self._efforts,
+            positionGains=[self._physics.position_gain] * n,
+            velocityGains=[self._physics.velocity_gain] * n,
+            **self._here,
+        )
+        p.stepSimulation(**self._here)
+        self._steps += 1
+        if self._began is not None and self._steps % 20 == 0:
+            self._show(self._began)
+
+    def _show(self, began: float) -> None:
+        """Keep a window's camera on the robot, and its time no faster than the world's."""
+        camera = Camera()
+        base, _ = self._p.getBasePositionAndOrientation(self._body, **self._here)
+        away = camera.distance * base[2]
+        self._p.resetDebugVisualizerCamera(away, camera.yaw, camera.pitch, base, **self._here)
+        time.sleep(max(0.0, began + self._steps * self.dt - time.monotonic()))
+
+    def observe(self) -> Observation:
+        """The state after the last step."""
+        p, here = self._p, self._here
+        joints = p.getJointStates(self._body, self._joints, **here)
+        position, quat_xyzw = p.getBasePositionAndOrientation(self._body, **here)
+        links = [p.getLinkState(self._body, foot.index, **here) for foot in self._feet]
+        return Observation(
+            time=self._steps * self.dt,
+            T_world_base=self._pose(position, quat_xyzw) @ self._T_inertial_base,
+            q=np.array([joint[0] for joint in joints]),
+            qd=np.array([joint[1] for joint in joints]),
+            torque=np.array([joint[3] for joint in joints]),
+            T_world_foot=np.array(
+                [
+                    self._pose(link[4], link[5]) @ foot.T_link_tip
+                    for foot, link in zip(self._feet, links, strict=True)
+                ]
+            ).reshape(-1, 4, 4),
+            ankle_wrench=np.array(
+                [self._ankle_wrench(foot, link) for foot, link in zip(self._feet, links, strict=True)]
+            ).reshape(-1, 6),
+            contacts=tuple(self._contacts()),
+        )
+
+    def _contacts(self) -> Iterator[Contact]:
+        """Points where the floor presses on the robot; the force includes friction."""
+        for touch in self._p.getContactPoints(self._body, self._floor, **self._here):
+            normal, pressing = touch[7], touch[9]
+            if pressing <= 0.0:
+                continue
+            side, along_side, other, along_other = touch[10:14]
+            force = [
+                n * pressing + a * side + b * other
+                for n, a, b in zip(normal, along_side, along_other, strict=True)
+            ]
+            yield Contact(self._link_names[touch[3] + 1], touch[6], (force[0], force[1], force[2]))
+
+    def _ankle_wrench(self, foot: _Foot, link: Any) -> Array:
+        """Ground wrench [m; f] about the world origin, from the sensor in the joint above a foot at rest.
+
+        PyBullet reports the reaction on the child in the child's inertial frame, about its CoM, without the
+        share of the motor. The floor gives what is needed beside that and the foot's weight.
+        """
+        _, _, reaction, motor = self._p.getJointState(self._body, foot.index, **self._here)
+        force, moment = np.array(reaction[:3]), np.array(reaction[3:])
+        if foot.turns:
+            moment = moment + motor * foot.axis_in_inertial
+        else:
+            force = force + motor * foot.axis_in_inertial
+        T = self._pose(link[0], link[1])
+        f = np.array([0.0, 0.0, foot.mass * self._physics.gravity]) - T[:3, :3] @ force
+        return np.concatenate([_cross(T[:3, 3], f) - T[:3, :3] @ moment, f])
+
+    def close(self) -> None:
+        """Disconnect; closing twice is harmless."""
+        if self._client >= 0:
+            self._p.disconnect(**self._here)
+            self._client = -1
+
+
+def _check_feet(robot: Robot) -> None:
+    bare = [limb for limb in robot.limbs if limb.kind == "leg" and not robot.link(limb.link).boxes]
+    if bare:
+        names = ", ".join(f"link {limb.link} of limb {limb.name}" for limb in bare)
+        raise InputError(
+            f"robot {robot.name}: {names} has no box, so it would sink into the floor. "
+            "Give the link a box whose bottom is the sole."
+        )
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Vector product of two triples; ``np.cross`` takes ten times as long for so little."""
+    (u, v, w), (x, y, z) = a.tolist(), b.tolist()
+    return np.array([v * z - w * y, w * x - u * z, u * y - v * x])
+
+
+def _quat_xyzw(R: Array) -> list[float]:
+    from scipy.spatial.transform import Rotation
+
+    quat: list[float] = Rotation.from_matrix(R).as_quat().tolist()
+    return quat
+
+
+def _imported_pybullet() -> Any:
+    try:
+        with _quiet():
+            import pybullet
+    except ImportError:
+        raise MissingDependencyError(
+            "simulation needs pybullet, which is not installed. With Python 3.11: python -m pip install "
+            "pybullet. For newer Pythons there are no wheels; everything but simulation works there."
+        ) from None
+    return pybullet
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Hold back what pybullet's C code prints on stderr when it is loaded."""
+    sys.stderr.flush()
+    kept = os.dup(2)
+    try:
+        with open(os.devnull, "w") as nowhere:
+            os.dup2(nowhere.fileno(), 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+
+
+def _connected(p: Any, gui: bool) -> int:
+    # Without a display PyBullet's window ends the whole process, so this is asked first.
+    if gui and sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
+        raise InputError("--gui needs a display, and DISPLAY is not set; leave --gui away")
+    client: int = p.connect(p.GUI if gui else p.DIRECT)
+    if client < 0:
+        raise InputError("PyBullet gave no simulation; close other windows of it, or leave --gui away")
+    return client

@@ -1,0 +1,163 @@
+"""Pictures of a robot made of boxes on a tiled floor, drawn by NumPy and Pillow alone.
+
+No display, no graphics card, no simulator: the same function draws what a simulator saw and what a trajectory
+plans. Faces are filled front to back by depth, the shadow is the boxes' outline carried along the light onto
+the floor, and everything is drawn at twice the size and then reduced, which smooths the edges.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from screwkin.kinematics.positions import link_displacements
+from screwkin.model.robot import Robot
+from screwkin.model.urdf import link_colours
+from screwkin.se3 import Vector, as_array, unstack
+from screwkin.sim.backend import Array
+from screwkin.sim.camera import Camera, Picture, View, following, view_of
+
+FINER = 2
+"""How many times larger pictures are drawn than they become."""
+LAMP = 1.4
+"""Brightness of the lamp: a face turned to it by 45 deg is fully lit."""
+SHADE = 0.30
+"""How much the shadow darkens the floor."""
+REACH = 12.0
+"""How far the floor is drawn, in distances of the camera; it fades into the sky on the way."""
+
+_SIGNS = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], dtype=float)
+_FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+
+
+def pictures(robot: Robot, time: Array, T_world_base: Array, q: Array, camera: Camera) -> list[Picture]:
+    """Pictures (height, width, 3) of K states, the camera gliding along.
+
+    Args:
+        robot: links with boxes; others are not seen.
+        time: (K,) [s], increasing.
+        T_world_base: (K, 4, 4).
+        q: (K, n).
+        camera: see ``Camera``.
+    """
+    corners, colours = _boxes(robot, T_world_base, q)
+    targets = following(time, T_world_base)
+    away = camera.distance * float(T_world_base[0, 2, 3])
+    return [
+        _picture(camera, target, away, boxes, colours) for target, boxes in zip(targets, corners, strict=True)
+    ]
+
+
+def _boxes(robot: Robot, T_world_base: Array, q: Array) -> tuple[Array, Array]:
+    """Corners (K, boxes, 8, 3) in the world, and colours (boxes, 3) [0, 1]."""
+    displacements = as_array(link_displacements(robot, unstack(np.asarray(q, dtype=float))))
+    paint = link_colours(robot)
+    corners, colours = [], []
+    for i, link in enumerate(robot.links):
+        T = T_world_base @ displacements[..., i, :, :]
+        for box in link.boxes:
+            local = _numbers(box.center) + 0.5 * _SIGNS * _numbers(box.size)
+            corners.append(local @ T[:, :3, :3].transpose(0, 2, 1) + T[:, None, :3, 3])
+            colours.append(paint[link.name][:3])
+    if not corners:
+        return np.zeros((len(q), 0, 8, 3)), np.zeros((0, 3))
+    return np.stack(corners, axis=1), np.array(colours)
+
+
+def _numbers(v: Vector) -> Array:
+    return np.array([float(component) for component in v])
+
+
+def _picture(camera: Camera, target: Array, away: float, boxes: Array, colours: Array) -> Picture:
+    from PIL import Image
+
+    view = view_of(camera, target, away, FINER)
+    canvas = _floor(camera, view, target, away, boxes)
+    light = np.array(camera.light) / np.linalg.norm(camera.light)
+    nearness = np.zeros(canvas.shape[:2])
+    for corners, colour in zip(boxes, colours, strict=True):
+        _draw_box(canvas, nearness, view, corners, colour, light, camera.ambient)
+    image = Image.fromarray(np.rint(255 * np.clip(canvas, 0.0, 1.0)).astype(np.uint8))
+    return np.asarray(image.resize((camera.width, camera.height), Image.Resampling.BOX))
+
+
+def _draw_box(
+    canvas: NDArray[np.float32],
+    nearness: Array,
+    view: View,
+    corners: Array,
+    colour: Array,
+    light: Array,
+    ambient: float,
+) -> None:
+    """Fill the faces of a box that can be seen; ``nearness`` is one over the depth of what is drawn there."""
+    middle = corners.mean(axis=0)
+    for face in _FACES:
+        quad = corners[list(face)]
+        normal = np.cross(quad[1] - quad[0], quad[2] - quad[0])
+        normal *= np.sign(normal @ (quad[0] - middle)) / np.linalg.norm(normal)
+        if normal @ (view.eye - quad[0]) <= 0.0:
+            continue
+        pixels, depth = view.project(quad)
+        low = np.maximum(np.floor(pixels.min(axis=0)).astype(int), 0)
+        high = np.minimum(np.ceil(pixels.max(axis=0)).astype(int) + 1, [view.width, view.height])
+        if (low >= high).any() or depth.min() <= 0.0:
+            continue
+        window = np.s_[low[1] : high[1], low[0] : high[0]]
+        x, y = np.meshgrid(np.arange(low[0], high[0]) + 0.5, np.arange(low[1], high[1]) + 0.5)
+        # One over the depth is linear over the picture; equal faces of two boxes go to the one drawn first.
+        plane = np.linalg.lstsq(np.column_stack([pixels, np.ones(4)]), 1.0 / depth, rcond=None)[0]
+        near = plane[0] * x + plane[1] * y + plane[2]
+        seen = _inside(pixels, x, y) & (near > 1.0001 * nearness[window])
+        nearness[window][seen] = near[seen]
+        lit = min(1.0, max(0.0, LAMP * float(normal @ light)))
+        canvas[window][seen] = colour * (ambient + (1.0 - ambient) * lit)
+
+
+def _inside(polygon: Array, x: Array, y: Array) -> NDArray[np.bool_]:
+    """Which points lie in a convex polygon, given in either sense of turning."""
+    edges = np.roll(polygon, -1, axis=0) - polygon
+    side = [ex * (y - py) - ey * (x - px) for (px, py), (ex, ey) in zip(polygon, edges, strict=True)]
+    return np.asarray((np.min(side, axis=0) >= 0.0) | (np.max(side, axis=0) <= 0.0))
+
+
+def _floor(camera: Camera, view: View, target: Array, away: float, boxes: Array) -> NDArray[np.float32]:
+    """Sky and floor with the boxes' shadow, (height, width, 3) in [0, 1].
+
+    The camera does not roll, so all rays of a row meet the floor on one line: what depends on the row alone
+    is computed once per row.
+    """
+    right, up, forward = view.axes
+    rays = forward + np.outer((view.height / 2 - np.arange(view.height) - 0.5) / view.focal, up)
+    sideways = (np.arange(view.width) + 0.5 - view.width / 2) / view.focal
+    reach = view.eye[2] / np.maximum(-rays[:, 2], 1e-6)
+    parity = np.zeros((view.height, view.width), dtype=np.int32)
+    for axis in (0, 1):
+        along = (view.eye[axis] + reach * rays[:, axis]) / camera.tile
+        across = np.outer(reach * right[axis] / camera.tile, sideways)
+        parity += np.floor(along[:, None] + across).astype(np.int32)
+    middle = view.eye[:2] + reach[:, None] * rays[:, :2] - target[:2]
+    gone = np.clip(np.linalg.norm(middle, axis=1) / (REACH * away), 0.0, 1.0)[:, None]
+    even, odd = (np.array(colour) * (1.0 - gone) + gone * camera.sky for colour in camera.tile_colours)
+    floor = np.where(
+        (parity & 1)[..., None], odd[:, None].astype(np.float32), even[:, None].astype(np.float32)
+    )
+    floor *= (1.0 - SHADE * _shadow(camera, view, boxes))[..., None]
+    return floor
+
+
+def _shadow(camera: Camera, view: View, boxes: Array) -> NDArray[np.float32]:
+    """Share (height, width) of the lamp's light that the boxes keep from the floor, softened at its edge."""
+    from PIL import Image, ImageDraw, ImageFilter
+
+    mask = Image.new("L", (view.width, view.height))
+    draw = ImageDraw.Draw(mask)
+    light = np.array(camera.light)
+    fallen = boxes - boxes[..., 2:] / light[2] * light
+    pixels, depth = view.project(fallen)
+    for corners, far in zip(pixels, depth, strict=True):
+        for face in _FACES:
+            if far[list(face)].min() > 0.0:
+                draw.polygon([tuple(corner) for corner in corners[list(face)].tolist()], fill=255)
+    soft = mask.filter(ImageFilter.GaussianBlur(1.5 * FINER))
+    return np.asarray(soft, dtype=np.float32) / 255.0

@@ -1,0 +1,142 @@
+"""One run of a trajectory through a backend: settle, play, hold, and write down everything."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from screwkin.model.robot import Robot
+from screwkin.model.state import State
+from screwkin.sim.backend import Array, Backend, Command, Observation
+from screwkin.trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """How a trajectory is played.
+
+    settle: standing at the first sample before it starts [s]; hold: standing at the last one after its end
+    [s]; fallen_tilt [rad] and fallen_height (share of the planned height of the base): beyond these the robot
+    has fallen; aftermath: how long the fall is watched [s].
+    """
+
+    settle: float = 0.5
+    hold: float = 0.5
+    fallen_tilt: float = np.deg2rad(30.0)
+    fallen_height: float = 0.6
+    aftermath: float = 0.4
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """What happened, one row per step; rows are at the end of their step.
+
+    time (K,) [s] of the trajectory, negative while settling; planned_base, T_world_base (K, 4, 4);
+    q_planned, q, qd, torque (K, n); T_world_foot (K, feet, 4, 4); ground_wrench (K, 6): [m; f] of all
+    contacts about the world origin; foot_force (K, feet, 3) of the contacts of the legs' last links;
+    ankle_wrench (K, feet, 6): ground wrench by the ankle sensors; touched: other links that met the floor;
+    fallen_at [s], None if it stood to the end.
+    """
+
+    engine: str
+    dt: float
+    time: Array
+    planned_base: Array
+    T_world_base: Array
+    q_planned: Array
+    q: Array
+    qd: Array
+    torque: Array
+    T_world_foot: Array
+    ground_wrench: Array
+    foot_force: Array
+    ankle_wrench: Array
+    touched: tuple[str, ...]
+    fallen_at: float | None
+
+    @property
+    def tilt(self) -> Array:
+        """Angle (K,) between the base's z axis and the vertical [rad]."""
+        return _tilt(self.T_world_base)
+
+
+def simulate(
+    robot: Robot,
+    trajectory: Trajectory,
+    backend: Backend,
+    schedule: Schedule | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Run:
+    """Play a trajectory in a backend, which stays open.
+
+    Commands are the cubic Hermite interpolation of the samples: in every step the joints are told their
+    position at its start and their mean rate through it, so a perfect servo is exact at every step's end.
+
+    Args:
+        robot: of which the trajectory speaks, joints in table order.
+        trajectory: what to play.
+        backend: where to play it.
+        schedule: settling, holding and when a fall is a fall.
+        progress: called now and then with the share done, 0 to 1.
+    """
+    rule = schedule or Schedule()
+    dt, start = backend.dt, float(trajectory.time[0])
+    count = round((rule.settle + trajectory.duration + rule.hold) / dt)
+    times: Array = start - rule.settle + dt * np.arange(count + 1, dtype=np.float64)
+    q, _ = trajectory.sampled(times)
+    planned = trajectory.base_sampled(times)
+    qd = np.diff(q, axis=0) / dt
+    backend.reset(State(planned[0], q[0]))
+    seen: list[Observation] = []
+    fallen_at: float | None = None
+    for k in range(count):
+        backend.step(Command(q[k], qd[k], planned[k + 1]))
+        seen.append(backend.observe())
+        now = float(times[k + 1])
+        if progress is not None and k % 100 == 99:
+            progress((k + 1) / count)
+        if fallen_at is None and _has_fallen(seen[-1].T_world_base, planned[k + 1], rule):
+            fallen_at = now
+        if fallen_at is not None and now >= fallen_at + rule.aftermath:
+            break
+    rows = len(seen)
+    return Run(
+        engine=backend.name,
+        dt=dt,
+        time=times[1 : rows + 1],
+        planned_base=planned[1 : rows + 1],
+        q_planned=q[1 : rows + 1],
+        fallen_at=fallen_at,
+        **_columns(robot, seen),
+    )
+
+
+def _columns(robot: Robot, seen: list[Observation]) -> dict[str, Any]:
+    """The observations as arrays, contacts gathered per step and per leg."""
+    names = ("T_world_base", "q", "qd", "torque", "T_world_foot", "ankle_wrench")
+    columns: dict[str, Any] = {name: np.array([getattr(o, name) for o in seen]) for name in names}
+    feet = {limb.link: i for i, limb in enumerate(limb for limb in robot.limbs if limb.kind == "leg")}
+    rows = [(k, c.link, *c.point, *c.force) for k, o in enumerate(seen) for c in o.contacts]
+    wrench = np.zeros((len(seen), 6))
+    forces = np.zeros((len(seen), len(feet), 3))
+    if rows:
+        step = np.array([row[0] for row in rows])
+        numbers = np.array([row[2:] for row in rows])
+        point, force = numbers[:, :3], numbers[:, 3:]
+        np.add.at(wrench, step, np.hstack([np.cross(point, force), force]))
+        foot = np.array([feet.get(row[1], -1) for row in rows])
+        np.add.at(forces, (step[foot >= 0], foot[foot >= 0]), force[foot >= 0])
+    others = dict.fromkeys(row[1] for row in rows if row[1] not in feet)
+    return {**columns, "ground_wrench": wrench, "foot_force": forces, "touched": tuple(others)}
+
+
+def _tilt(T: Array) -> Array:
+    """Angle between z axes and the vertical [rad]; exact near 0, where the arc cosine is not."""
+    return np.asarray(np.arctan2(np.hypot(T[..., 0, 2], T[..., 1, 2]), T[..., 2, 2]))
+
+
+def _has_fallen(T: Array, planned: Array, rule: Schedule) -> bool:
+    return bool(_tilt(T) > rule.fallen_tilt or T[2, 3] < rule.fallen_height * planned[2, 3])
