@@ -1,4 +1,4 @@
-"""What a user installs: the wheel, built from the source archive, carries robots, gaits, types and command."""
+"""What a user installs: the wheel, built from the source archive, with robots, gaits, types and command."""
 
 from __future__ import annotations
 
