@@ -45,7 +45,7 @@ class Screw:
     @classmethod
     def unflattened(cls, pitch: Scalar, leaves: tuple[Any, ...]) -> Screw:
         """The screw of such leaves and static part."""
-        return cls(*leaves) if pitch is None else cls(*leaves, pitch)
+        return cls(*leaves, *(() if pitch is None else (pitch,)))
 
 
 @record

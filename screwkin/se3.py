@@ -16,7 +16,7 @@ from screwkin import scalar
 from screwkin.scalar import Scalar, dense, is_jax, is_symbolic, minus, over, plus, times
 
 R = TypeVar("R")
-_RECORDS: list[type] = []
+_RECORDS: list[Any] = []
 _registered_with_jax: set[type] = set()
 
 
@@ -24,7 +24,7 @@ _registered_with_jax: set[type] = set()
 def record(cls: type[R]) -> type[R]:
     """A frozen dataclass that NumPy leaves alone in operators and that JAX can learn about."""
     made = dataclass(frozen=True, eq=False)(cls)
-    made.__array_ufunc__ = None
+    made.__array_ufunc__ = None  # type: ignore[attr-defined]
     _RECORDS.append(made)
     return made
 
@@ -42,7 +42,7 @@ def register_with_jax() -> None:
             if hasattr(cls, "flattened"):
                 jax.tree_util.register_pytree_node(cls, cls.flattened, cls.unflattened)
             else:
-                names = [f.name for f in fields(cls)]  # type: ignore[arg-type]
+                names = [f.name for f in fields(cls)]
                 jax.tree_util.register_dataclass(cls, data_fields=names, meta_fields=[])
 
 
