@@ -1,0 +1,128 @@
+"""The command ``screwkin VERB …``: every verb is a module of this package, loaded when it is called.
+
+A verb's module holds a function of the verb's name, whose signature typer reads; it returns the exit code.
+0 good; 1 unexpected; 2 bad input or usage; 3 the answer is no; 4 refused for safety; 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from io import TextIOWrapper
+from typing import Any, NoReturn
+
+from screwkin.errors import InputError, ScrewkinError, UnknownNameError
+
+VERBS = {
+    "demo": "A robot walks: table, mechanism, gait, ZMP, simulation, and a report with pictures.",
+    "robots": "List the bundled robots and mechanisms.",
+    "gaits": "List the bundled gaits.",
+    "info": "Mass, closed mechanism and conditioning of a robot.",
+    "table": "The screw table of a robot; also Markdown, LaTeX and symbolic.",
+    "walk": "Make the trajectory of a gait, with plots and a report.",
+    "zmp": "Recompute CoM, ZMP, margins and spikes of a trajectory.",
+    "validate": "Simulate a trajectory and give a verdict.",
+}
+
+_INTERRUPTED = 130
+
+_USAGE = """\
+Usage: screwkin VERB [ARGUMENTS] [OPTIONS]
+
+Humanoid robots by screw theory: from a screw table to a walking robot.
+
+Verbs:
+{verbs}
+
+Options:
+  --help     Show this message; screwkin VERB --help tells about a verb.
+  --version  Show the version.
+  --debug    With any verb: show the traceback of an error.
+
+Begin with: screwkin demo
+"""
+
+
+def main(argv: Sequence[str] | None = None) -> NoReturn:
+    """Run the command line and exit with its code; the entry point of ``screwkin``."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal without Unicode is no reason to fail
+    sys.exit(run(sys.argv[1:] if argv is None else argv))
+
+
+def run(argv: Sequence[str]) -> int:
+    """Run the command line and return its exit code: every error ends as one message on stderr."""
+    words = [word for word in argv if word != "--debug"]
+    debug = len(words) < len(argv) or bool(os.environ.get("SCREWKIN_DEBUG"))
+    try:
+        code = _dispatch(words)
+        sys.stdout.flush()
+        return code
+    except BrokenPipeError:
+        # The reader has gone (as in ``screwkin table … | head``); nothing may be flushed at exit either.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return _INTERRUPTED
+    except Exception as error:
+        if debug:
+            import traceback
+
+            traceback.print_exc()
+        return _told(error, words, debug)
+
+
+def _dispatch(words: Sequence[str]) -> int:
+    """Call the verb of a command line."""
+    name = words[0] if words else "--help"
+    if name in ("--help", "-h", "help"):
+        width = max(map(len, VERBS))
+        print(
+            _USAGE.format(verbs="\n".join(f"  {verb:{width}}  {text}" for verb, text in VERBS.items())),
+            end="",
+        )
+        return 0
+    if name == "--version":
+        from screwkin import __version__
+
+        print(f"screwkin {__version__}")
+        return 0
+    if name.startswith("-"):
+        raise InputError(f"unknown option {name}; screwkin --help lists the options and verbs")
+    if name not in VERBS:
+        raise UnknownNameError("verb", name, tuple(VERBS))
+    import typer
+
+    # No markup: a rich help would swallow brackets, and cost a tenth of a second.
+    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+    app.command(name)(getattr(import_module(f"screwkin.cli.{name}"), name))
+    try:
+        code: Any = app(args=list(words[1:]), prog_name=f"screwkin {name}", standalone_mode=False)
+    except typer.Abort:
+        code = _INTERRUPTED
+    if code == _INTERRUPTED:  # typer's answer to an interrupt, older versions abort
+        raise KeyboardInterrupt
+    return int(code or 0)
+
+
+def _told(error: Exception, words: Sequence[str], debug: bool) -> int:
+    """Tell an error in one message, with ``--json`` also as an object on stdout; returns its exit code."""
+    if isinstance(error, ScrewkinError):
+        code, message = error.exit_code, str(error)
+    elif hasattr(error, "format_message"):  # typer's own: an unknown option, a missing argument
+        code, message = 2, f"{error.format_message()} (screwkin {words[0]} --help)"
+    else:
+        code, message = 1, f"unexpected {type(error).__name__}: {error}"
+    print(f"error: {message}", file=sys.stderr)
+    if code == 1 and not debug:
+        print(f"For the traceback: screwkin {' '.join(words)} --debug", file=sys.stderr)
+    if "--json" in words:
+        from screwkin.cli.output import print_json
+
+        facts = {"limb": getattr(error, "limb", None), "sample": getattr(error, "sample", None)}
+        print_json({"error": message, "exit_code": code, **{k: v for k, v in facts.items() if v is not None}})
+    return code

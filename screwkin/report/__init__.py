@@ -1,0 +1,1 @@
+"""Pictures, numbers and pages about a trajectory and its simulation."""

@@ -1,0 +1,121 @@
+"""``screwkin demo``: the whole story in one command."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from screwkin.cli.folder import output_folder
+from screwkin.cli.options import AsJson, OutputFolder
+from screwkin.cli.output import aligned, print_json, remark, silent
+from screwkin.cli.simulation import Wish, simulate
+from screwkin.cli.walk import chosen_gait, command_of, make_trajectory, write_report
+from screwkin.errors import MissingDependencyError
+from screwkin.gait.record import Gait
+from screwkin.model.library import robot_names
+from screwkin.model.robot import Robot
+from screwkin.model.table import load_robot
+from screwkin.report.facts import Facts, facts_of
+from screwkin.report.numbers import balance_numbers, validation_numbers
+from screwkin.scalar import Scalar
+
+Tell = Callable[[str], None]
+
+
+def demo(
+    robot: Annotated[
+        str | None,
+        typer.Argument(metavar="[ROBOT]", help="A robot's name or table; default: the first bundled one."),
+    ] = None,
+    gait: Annotated[str, typer.Option(metavar="NAME|FILE", help="The gait.")] = "walk",
+    steps: Annotated[int, typer.Option(help="Number of steps.")] = 6,
+    output: OutputFolder = None,
+    as_json: AsJson = False,
+) -> int:
+    """A robot walks: its screw table, closed mechanism, gait, ZMP and simulation, and a report with pictures.
+
+    Takes well under a minute. Exit code 3 if the robot does not walk as planned.
+    """
+    tell = _say if not as_json else remark if sys.stderr.isatty() else silent
+    name = robot or robot_names()[0]
+    table, chosen = load_robot(name), chosen_gait(gait, [], None)
+    with output_folder(output, "demo", table.name) as folder:
+        _tell_robot(tell, table)
+        facts = facts_of(table)
+        _tell_mechanism(tell, facts)
+        _tell_gait(tell, chosen, steps)
+        command = command_of(name, gait, steps, [], None)
+        account = make_trajectory(table, chosen, steps, command, folder)
+        tell(
+            f"   The loops close to {account.max_closure:.0e} m; rates and accelerations by Davies' method.\n"
+        )
+        tell("4. The ZMP, from the dynamics of all links")
+        tell(aligned(balance_numbers(account), "   ") + "\n")
+        tell("5. The simulation: bodies, motors and contacts decide")
+        npz = folder / "trajectory.npz"
+        wish = Wish(video=True, commands=(command, f"screwkin validate {npz.name} --video"))
+        try:
+            check = simulate(account, folder, folder / "validation.json", wish)
+        except MissingDependencyError:
+            page = write_report(account, folder)
+            remark(f"The report stops before the simulation: {page}")
+            raise
+        tell(aligned(validation_numbers(check), "   ") + "\n")
+        _tell_end(tell, folder, check.passed, check.reasons)
+    if as_json:
+        print_json(
+            {"robot": table.name, "mobility": facts.mobility, **check.to_dict(), "folder": str(folder)}
+        )
+    return 0 if check.passed else 3
+
+
+def _say(text: str) -> None:
+    print(text, flush=True)
+
+
+def _tell_robot(tell: Tell, robot: Robot) -> None:
+    tell(f"1. The robot: {robot.description}, {float(robot.mass):.3f} kg")
+    tell("   is a table of screws, one per joint: an axis s through a point s0 in the zero pose. One limb:")
+    limb = robot.limbs[0] if robot.limbs else None
+    joints = [robot.joints[i] for i in robot.path_to(limb.link)] if limb else list(robot.joints[:6])
+    rows = [(j.name, _triple(j.screw.s, "g"), _triple(j.screw.s0, ".4f")) for j in joints]
+    tell(aligned([("joint", "s", "s0 [m]"), *rows], "     ") + "\n")
+
+
+def _triple(vector: Iterable[Scalar], form: str) -> str:
+    return "(" + ", ".join(format(float(c), form) for c in vector) + ")"
+
+
+def _tell_mechanism(tell: Tell, facts: Facts) -> None:
+    mechanism = facts.mechanism
+    rows, columns = facts.network_shape
+    tell("2. The closed mechanism: virtual chains tie waist, feet and hands to the floor")
+    tell(
+        f"   {columns} couplings, {len(mechanism.links)} links, {len(mechanism.circuit_matrix)} circuits, "
+        f"mobility {facts.mobility}\n"
+        f"   network matrix {rows} x {columns} of rank {facts.rank}, cond(Ns) = {facts.condition:.0f}"
+    )
+    tell(
+        f"   {len(mechanism.primary)} couplings impose, {len(mechanism.secondary)} follow: "
+        f"all {len(facts.robot.joints)} real joints are solved at once.\n"
+    )
+
+
+def _tell_gait(tell: Tell, gait: Gait, steps: int) -> None:
+    tell(f"3. The gait {gait.name}: {gait.description}")
+    tell(
+        f"   {steps} steps of {gait.Tc:g} s, waist at {1e3 * gait.waist_height:g} mm, swings lift "
+        f"{1e3 * gait.lift:g} mm."
+    )
+
+
+def _tell_end(tell: Tell, folder: Path, passed: bool, reasons: tuple[str, ...]) -> None:
+    tell("It walks: passed." if passed else "It does not walk as planned:")
+    for reason in reasons:
+        tell(f"  {reason}")
+    tell(f"The report with all pictures: {folder / 'report.html'}")
+    tell(f"The film: {folder / 'walk.gif'}")

@@ -1,0 +1,80 @@
+"""``screwkin info``."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from screwkin.cli.options import AsJson, RobotName, place
+from screwkin.cli.output import aligned, print_json
+from screwkin.model.table import load_robot
+from screwkin.report.facts import Facts, facts_of
+
+
+def info(
+    robot: RobotName,
+    posture: Annotated[str | None, typer.Option(help="A posture of the table; default home.")] = None,
+    at: Annotated[
+        str | None, typer.Option(metavar="X,Y,Z", help="Where the robot stands in the world [m].")
+    ] = None,
+    point: Annotated[
+        str | None,
+        typer.Option(metavar="X,Y,Z", help="World point where N is formed [m]; default: the waist."),
+    ] = None,
+    as_json: AsJson = False,
+) -> int:
+    """Mass, closed mechanism (couplings, circuits, mobility, network matrix) and conditioning of a robot."""
+    told = facts_of(load_robot(robot), posture, place(at, "--at") or (0.0, 0.0, 0.0), place(point, "--point"))
+    if as_json:
+        print_json(told.to_dict())
+    else:
+        print(_text(told))
+    return 0
+
+
+def _text(told: Facts) -> str:
+    robot, mechanism, data = told.robot, told.mechanism, told.to_dict()
+    virtual = [name for name in mechanism.couplings if name not in robot.joint_names]
+    rows, columns = told.network_shape
+    body = [
+        ("mass", f"{data['mass']:.4f} kg"),
+        ("bodies, joints", f"{data['bodies']}, {data['joints']} ({data['actuated_joints']} actuated)"),
+        *(
+            (limb.name, f"{limb.kind} with {len(robot.path_to(limb.link))} joints, tip {limb.tip}")
+            for limb in robot.limbs
+        ),
+    ]
+    closed = [
+        ("couplings", f"{data['couplings']}: {len(robot.joints)} real, {len(virtual)} virtual"),
+        ("links", data["links"]),
+        ("circuits", data["circuits"]),
+        ("mobility", f"{data['mobility']} (by counting: {data['kutzbach']})"),
+        ("network matrix N", f"{rows} x {columns}, rank {data['rank']}"),
+        ("primary", _listed(mechanism.primary)),
+        ("secondary", _listed(mechanism.secondary)),
+        ("cond(Ns)", f"{told.condition:.4g}"),
+    ]
+    limbs = [
+        (limb.limb, f"{limb.sigma:.4f}", f"NEAR A SINGULARITY: {limb.cause}" if limb.near else "regular")
+        for limb in told.limbs
+    ]
+    parts = [
+        f"{robot.name}: {robot.description}",
+        aligned(body, "  "),
+        "closed mechanism",
+        aligned(closed, "  "),
+    ]
+    if limbs:
+        parts += ["smallest singular value, made dimensionless by the robot's size", aligned(limbs, "  ")]
+    return "\n".join(parts)
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    """Names, those of one chain together: ``waist.px py pz``."""
+    groups: dict[str, list[str]] = {}
+    for name in names:
+        chain, dot, axis = name.partition(".")
+        groups.setdefault(chain + dot, []).append(axis)
+    listed = ", ".join(chain + " ".join(axes) for chain, axes in groups.items())
+    return f"{len(names)}: {listed}" if names else "0"

@@ -1,0 +1,65 @@
+"""What verbs print: one JSON object, or text; progress and remarks go to stderr."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+
+def print_json(data: Mapping[str, Any]) -> None:
+    """One JSON object on stdout; numbers that JSON does not know (NaN, infinity) become null."""
+    print(json.dumps(plain(data), indent=2, allow_nan=False))
+
+
+def plain(value: Any) -> Any:
+    """The value as JSON data: NumPy's numbers and arrays, tuples and mappings turned into JSON's own."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if hasattr(value, "tolist"):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    return str(value)
+
+
+def remark(text: str) -> None:
+    """A line for the reader that is no result."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def silent(text: str) -> None:
+    """Nothing: for those who asked for JSON alone."""
+
+
+def aligned(rows: Sequence[Sequence[Any]], indent: str = "") -> str:
+    """Rows of cells as lines, every column as wide as its widest cell."""
+    cells = [[str(cell) for cell in row] for row in rows]
+    columns = max(map(len, cells), default=0)
+    widths = [max((len(row[k]) for row in cells if k < len(row)), default=0) for k in range(columns)]
+    return "\n".join(
+        (indent + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False))).rstrip()
+        for row in cells
+    )
+
+
+@contextmanager
+def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
+    """A bar on stderr while it is a terminal, else nothing; gives a function that takes the share done."""
+    if not sys.stderr.isatty():
+        yield lambda share: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
+        task = shown.add_task(label.replace("[", r"\["), total=1.0)
+        yield lambda share: shown.update(task, completed=share)

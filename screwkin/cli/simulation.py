@@ -1,0 +1,82 @@
+"""A simulation and its files: what ``validate`` and ``demo`` share."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from screwkin.analysis.validate import ENGINES, Engine, Validation
+from screwkin.analysis.validate import validate as validated
+from screwkin.cli.output import plain, progress_bar
+from screwkin.errors import UnknownNameError
+from screwkin.files import atomic_write
+from screwkin.report.account import Account
+from screwkin.report.page import write_page
+from screwkin.report.pictures import save_pictures
+from screwkin.sim.camera import Camera, save_gif
+
+PICTURES_PER_SECOND = 6.0
+FEWEST, MOST = 30, 120
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What a simulation is to be: engine, a window, a film, pictures and page; commands for the page."""
+
+    engine: str = "pybullet"
+    gui: bool = False
+    video: bool = False
+    plots: bool = True
+    commands: Sequence[str] = ()
+
+
+def simulate(account: Account, folder: Path, verdict: Path, wish: Wish) -> Validation:
+    """Simulate a trajectory, write the verdict, then film, pictures and report.
+
+    Args:
+        account: of the trajectory.
+        folder: for pictures and report.
+        verdict: path of ``validation.json``.
+        wish: what to do.
+
+    Raises:
+        UnknownNameError: no such engine. MissingDependencyError: it is not installed.
+        OutputError: a file cannot be written.
+    """
+    trajectory = account.trajectory
+    camera = _camera(trajectory.duration) if wish.video else None
+    with progress_bar("simulation") as done:
+        check = validated(
+            account.robot, trajectory, engine(wish.engine), gui=wish.gui, camera=camera, progress=done
+        )
+    with atomic_write(verdict) as file:
+        file.write(json.dumps(plain(check.to_dict()), indent=2, allow_nan=False) + "\n")
+    film = None
+    if camera is not None and check.pictures:
+        film = save_gif(folder / "walk.gif", check.pictures, trajectory.duration / (camera.pictures - 1))
+    if wish.plots:
+        with progress_bar("pictures") as done:
+            pictures = save_pictures(account, folder, check, done)
+        write_page(folder / "report.html", account, pictures, check, film, wish.commands)
+    return check
+
+
+def engine(name: str) -> Engine:
+    """The engine of that name.
+
+    Raises:
+        UnknownNameError: there is none; it lists the engines.
+    """
+    for known in ENGINES:
+        if name == known:
+            return known
+    raise UnknownNameError("engine", name, ENGINES)
+
+
+def _camera(duration: float) -> Camera:
+    """A film at the robot's own speed, a few pictures per second."""
+    return Camera(pictures=int(np.clip(PICTURES_PER_SECOND * duration, FEWEST, MOST)))

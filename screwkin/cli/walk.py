@@ -1,0 +1,106 @@
+"""``screwkin walk``."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from screwkin.cli.folder import output_folder
+from screwkin.cli.options import AsJson, OutputFolder, RobotName, settings
+from screwkin.cli.output import aligned, print_json, progress_bar, remark
+from screwkin.gait.files import load_gait
+from screwkin.gait.record import Gait
+from screwkin.gait.walk import walk as walk_of
+from screwkin.model.robot import Robot
+from screwkin.model.table import load_robot
+from screwkin.report.account import Account, account_of
+from screwkin.report.numbers import walk_data, walk_numbers
+
+
+def walk(
+    robot: RobotName,
+    gait: Annotated[
+        str, typer.Option(metavar="NAME|FILE", help="A bundled gait's name, or the path of a file.")
+    ] = "walk",
+    steps: Annotated[int, typer.Option(help="Number of steps.")] = 8,
+    assignments: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Change a parameter of the gait; may be repeated."),
+    ] = None,
+    rate: Annotated[float | None, typer.Option(help="Samples per second; default: the gait's.")] = None,
+    plots: Annotated[bool, typer.Option(help="Draw the pictures and write the report.")] = True,
+    output: OutputFolder = None,
+    as_json: AsJson = False,
+) -> int:
+    """Make the trajectory of a gait: trajectory.npz, trajectory.csv, plots and report.html.
+
+    Exit code 3 if a limb cannot reach, is singular or beyond a limit; the message names limb and time. A ZMP
+    outside the support polygon is told, but the trajectory is still made.
+    """
+    table = load_robot(robot)
+    chosen = chosen_gait(gait, assignments or [], rate)
+    command = command_of(robot, gait, steps, assignments or [], rate)
+    with output_folder(output, "walk", table.name) as folder:
+        account = make_trajectory(table, chosen, steps, command, folder)
+        if plots:
+            write_report(account, folder)
+    if as_json:
+        print_json({**walk_data(account), "gait": chosen.name, "folder": str(folder)})
+    else:
+        _print_summary(account, chosen, folder)
+    return 0
+
+
+def chosen_gait(name: str, assignments: Sequence[str], rate: float | None) -> Gait:
+    """The gait with what the command line changes of it."""
+    changes: dict[str, str | float] = {**settings(list(assignments))}
+    if rate is not None:
+        changes["rate"] = rate
+    gait = load_gait(name)
+    return gait.replace(**changes) if changes else gait
+
+
+def command_of(robot: str, gait: str, steps: int, assignments: Sequence[str], rate: float | None) -> str:
+    """The command line that makes the same trajectory again, wherever its files go."""
+    words = ["screwkin", "walk", robot, "--gait", gait, "--steps", str(steps)]
+    words += [word for text in assignments for word in ("--set", text)]
+    words += [] if rate is None else ["--rate", f"{rate:g}"]
+    return shlex.join(words)
+
+
+def make_trajectory(robot: Robot, gait: Gait, steps: int, command: str, folder: Path) -> Account:
+    """Make a trajectory and write it as ``.npz`` and ``.csv``."""
+    with progress_bar("walk") as done:
+        trajectory = walk_of(robot, gait, steps, command)
+        done(0.5)
+        account = account_of(robot, trajectory)
+    trajectory.save(folder / "trajectory.npz")
+    trajectory.save(folder / "trajectory.csv")
+    return account
+
+
+def write_report(account: Account, folder: Path) -> Path:
+    """Draw all pictures and write the page."""
+    from screwkin.report.page import write_page
+    from screwkin.report.pictures import save_pictures
+
+    with progress_bar("pictures") as done:
+        pictures = save_pictures(account, folder, progress=done)
+    return write_page(folder / "report.html", account, pictures)
+
+
+def _print_summary(account: Account, gait: Gait, folder: Path) -> None:
+    print(f"{account.robot.name} walks {account.steps} steps of gait {gait.name}")
+    print(aligned(walk_numbers(account), "  "))
+    for warning in account.warnings:
+        remark(f"warning: {warning}")
+    if account.outside.any():
+        remark(
+            "warning: the ZMP leaves the support polygon: on the floor the robot would tip over "
+            "(screwkin validate tells)"
+        )
+    print(f"files in {folder}: {', '.join(sorted(path.name for path in folder.iterdir() if path.is_file()))}")

@@ -1,0 +1,207 @@
+"""Pictures of the balance: GCoM against ZMP, the margin, and the walk seen from above."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from screwkin.dynamics.support import Spike, convex_hull
+from screwkin.gait.balance import soles_on_floor
+from screwkin.report.account import Account
+from screwkin.report.style import (
+    GCOM,
+    PLAIN,
+    SIDES,
+    ZMP,
+    Axes,
+    Figure,
+    foot_colours,
+    legend_above,
+    new_figure,
+    shade_swings,
+    shown,
+    spans,
+    time_axis,
+)
+from screwkin.solve.singularity import NEAR
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+_AXES = ("x", "y")
+_APART = 0.018  # of the duration: labels of spikes nearer than that would overlap
+
+
+def support_polygons(account: Account) -> list[tuple[int, int, Array]]:
+    """First and last sample of every phase of support, and the corners (k, 2) of its polygon [m]."""
+    trajectory = account.trajectory
+    soles = soles_on_floor(account.robot, trajectory.feet, trajectory.T_world_tip)
+    contact = trajectory.contact
+    changed = np.flatnonzero((contact[1:] != contact[:-1]).any(axis=1)) + 1
+    starts = [0, *changed.tolist()]
+    ends = [*changed.tolist(), trajectory.samples]
+    return [
+        (begin, end - 1, convex_hull(soles[begin, contact[begin]].reshape(-1, 2)))
+        for begin, end in zip(starts, ends, strict=True)
+        if contact[begin].any()
+    ]
+
+
+def zmp_against_gcom(account: Account, axis: int) -> Figure:
+    """GCoM and ZMP against time along x (0) or y (1), and how far they are apart, with the spikes' times."""
+    time, balance = account.trajectory.time, account.balance
+    scale, unit = (1.0, "m") if np.ptp(balance.com[:, axis]) > 0.3 else (1e3, "mm")
+    figure, (place, apart) = new_figure(4.6, 2, sharex=True, height_ratios=(3, 2))
+    low, high = _extent(account, axis)
+    place.fill_between(
+        time, scale * low, scale * high, step="post", color="#EFEFEA", linewidth=0, label="support polygon"
+    )
+    place.plot(time, scale * balance.com[:, axis], color=GCOM, label="GCoM")
+    place.plot(time, scale * balance.zmp[:, axis], color=ZMP, linewidth=1.2, label="ZMP")
+    _boundaries(place, account)
+    place.set_ylabel(f"{_AXES[axis]} of GCoM and ZMP [{unit}]")
+    difference = 1e3 * (balance.zmp - balance.com[:, :2])[:, axis]
+    shade_swings(apart, account)
+    apart.plot(time, difference, color=PLAIN, linewidth=1.1, label="ZMP - GCoM")
+    apart.axhline(0.0, color="#999999", linewidth=0.7)
+    _label_spikes(apart, balance.spikes, time, difference)
+    apart.set_ylabel("ZMP - GCoM [mm]")
+    time_axis(apart, account)
+    legend_above(figure, [place, apart], columns=4)
+    return figure
+
+
+def _extent(account: Account, axis: int) -> tuple[Array, Array]:
+    """Least and largest coordinate (T,) of the support polygon."""
+    low, high = (np.full(account.trajectory.samples, np.nan) for _ in range(2))
+    for begin, end, polygon in support_polygons(account):
+        low[begin : end + 1], high[begin : end + 1] = polygon[:, axis].min(), polygon[:, axis].max()
+    return low, high
+
+
+def _boundaries(axes: Axes, account: Account) -> None:
+    for boundary in account.boundaries[1:-1]:
+        axes.axvline(boundary, color="#BBBBBB", linewidth=0.6, zorder=0.6)
+
+
+def margin_over_time(account: Account) -> Figure:
+    """The ZMP's margin, and its distance from the GCoM with the spikes and their times."""
+    time, balance = account.trajectory.time, account.balance
+    figure, (inside, distance) = new_figure(4.6, 2, sharex=True)
+    shade_swings(inside, account)
+    margin = 1e3 * balance.margin
+    inside.plot(time, margin, color=ZMP, label="margin of the ZMP")
+    inside.axhline(0.0, color="#B00020", linewidth=1.0, label="border of the support polygon")
+    for begin, end in spans(account.outside):
+        inside.axvspan(time[begin], time[end], color="#B00020", alpha=0.25, linewidth=0, label=None)
+    worst = int(margin.argmin())
+    inside.plot(time[worst], margin[worst], "o", color=ZMP, markersize=4)
+    inside.annotate(
+        f"{margin[worst]:.1f} mm at {time[worst]:.2f} s",
+        (time[worst], margin[worst]),
+        xytext=(8, -3),
+        textcoords="offset points",
+        va="top",
+        fontsize=8,
+        color=ZMP,
+    )
+    inside.set_ylim(min(0.0, margin.min()) - 0.16 * np.ptp(margin), None)
+    inside.set_ylabel("margin [mm]")
+    shade_swings(distance, account)
+    apart = 1e3 * balance.distance
+    distance.plot(time, apart, color=PLAIN, linewidth=1.1, label="|GCoM - ZMP|")
+    threshold = 2.0 * float(np.median(apart))
+    distance.axhline(threshold, color=PLAIN, linewidth=0.8, linestyle=":", label="twice its median")
+    _label_spikes(distance, balance.spikes, time, apart)
+    distance.set_ylabel("|GCoM - ZMP| [mm]")
+    time_axis(distance, account)
+    legend_above(figure, [inside, distance], columns=4)
+    return figure
+
+
+def _label_spikes(axes: Axes, spikes: Sequence[Spike], time: Array, value: Array) -> None:
+    """Mark every spike, and write the time of the largest one wherever several stand close together."""
+    duration = time[-1] - time[0]
+    at = [int(np.abs(time - spike.time).argmin()) for spike in spikes]
+    if at:
+        axes.plot(time[at], value[at], "o", color=ZMP, markersize=3, label="spike, with its time [s]")
+    told: list[Spike] = []
+    for spike, i in sorted(zip(spikes, at, strict=True), key=lambda pair: -pair[0].distance):
+        if all(abs(spike.time - other.time) > _APART * duration for other in told):
+            told.append(spike)
+            up = value[i] >= 0
+            axes.annotate(
+                f"{spike.time:.2f}",
+                (time[i], value[i]),
+                xytext=(0, 4 if up else -4),
+                textcoords="offset points",
+                ha="center",
+                va="bottom" if up else "top",
+                fontsize=6.5,
+                color=ZMP,
+                rotation=90 if len(spikes) > 12 else 0,
+            )
+    low, high = min(0.0, float(value.min())), max(0.0, float(value.max()))
+    room = 0.32 * (high - low or 1.0)
+    axes.set_ylim(low - (room if low < 0 else 0), high + (room if high > 0 else 0))
+
+
+def seen_from_above(account: Account) -> Figure:
+    """Soles where they stand, support polygons, and the paths of GCoM and ZMP."""
+    trajectory, balance = account.trajectory, account.balance
+    soles = soles_on_floor(account.robot, trajectory.feet, trajectory.T_world_tip)
+    everything = np.concatenate([soles.reshape(-1, 2), balance.zmp, balance.com[:, :2]])
+    size = np.ptp(everything, axis=0)
+    figure, axes = new_figure(1.0 + float(np.clip(8.0 * size[1] / size[0], 1.2, 5.5)))
+    for polygon in _different([polygon for _, _, polygon in support_polygons(account)]):
+        axes.fill(*polygon.T, facecolor="#77777712", edgecolor="#77777755", linewidth=0.6)
+    for k, (foot, colour) in enumerate(foot_colours(account).items()):
+        for n, (begin, _) in enumerate(_placements(soles[:, k], trajectory.contact[:, k])):
+            label = f"{shown(foot)} on the floor" if n == 0 else None
+            corners = np.vstack([soles[begin, k], soles[begin, k, :1]])
+            axes.plot(*corners.T, color=colour, linewidth=1.3, label=label)
+    axes.fill([], [], facecolor="#77777722", edgecolor="#77777777", label="support polygons")
+    axes.plot(*balance.com[:, :2].T, color=GCOM, label="GCoM")
+    axes.plot(*balance.zmp.T, color=ZMP, linewidth=1.1, label="ZMP")
+    out = account.outside
+    if out.any():
+        axes.plot(*balance.zmp[out].T, ".", color="#B00020", markersize=4, label="ZMP outside")
+    axes.set_aspect("equal")
+    axes.grid(True, axis="both")
+    axes.set_xlabel("x [m]")
+    axes.set_ylabel("y [m]")
+    legend_above(figure, [axes], columns=6)
+    return figure
+
+
+def _different(polygons: Sequence[Array]) -> list[Array]:
+    """Every polygon once, however often it recurs."""
+    return list({tuple(np.sort(polygon.round(6), axis=0).ravel()): polygon for polygon in polygons}.values())
+
+
+def _placements(corners: Array, contact: Array) -> list[tuple[int, int]]:
+    """Spans of samples in which a sole stands in one place, each place once."""
+    places: list[tuple[int, int]] = []
+    for begin, end in spans(contact):
+        if not any(np.abs(corners[begin] - corners[other]).max() < 1e-6 for other, _ in places):
+            places.append((begin, end))
+    return places
+
+
+def singular_values_over_time(account: Account) -> Figure | None:
+    """The least singular value of every limb along the motion; None for a robot without limbs."""
+    if not account.sigma:
+        return None
+    colours = {limb.name: limb.kind for limb in account.robot.limbs}
+    figure, axes = new_figure(2.8)
+    _boundaries(axes, account)
+    for k, (name, sigma) in enumerate(account.sigma.items()):
+        style = "--" if colours.get(name) == "arm" else "-"
+        axes.plot(account.trajectory.time, sigma, color=SIDES[k % 2], linestyle=style, label=shown(name))
+    axes.axhline(NEAR, color="#B00020", linewidth=0.9, label="near singular below")
+    axes.set_ylim(bottom=0.0)
+    axes.set_ylabel("least singular value [1]")
+    time_axis(axes, account)
+    legend_above(figure, [axes])
+    return figure

@@ -1,0 +1,120 @@
+"""Pictures of the robot itself: the plan seen from the side, or the simulation as a camera sees it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from screwkin.dynamics.support import convex_hull
+from screwkin.kinematics.positions import link_displacements
+from screwkin.model.robot import Robot
+from screwkin.report.account import Account
+from screwkin.report.style import Axes, Figure, limb_colours, new_figure
+from screwkin.se3 import as_array, pose_from_array, unstack
+from screwkin.sim.camera import Camera
+from screwkin.sim.render import pictures
+from screwkin.sim.run import Run
+
+Array = np.ndarray[Any, np.dtype[Any]]
+
+ROWS, COLUMNS = 2, 3
+
+
+def frame_times(account: Account) -> Array:
+    """Times (6,) [s], evenly over one gait cycle of two steps in the middle of the walk, else over all."""
+    boundaries, time, count = account.boundaries, account.trajectory.time, ROWS * COLUMNS
+    if len(boundaries) < 5:
+        return np.linspace(time[0], time[-1], count)
+    middle = (len(boundaries) - 1) // 2
+    begin = middle - middle % 2
+    return np.linspace(boundaries[begin], boundaries[begin + 2], count, endpoint=False)
+
+
+def frames_of_run(account: Account, run: Run) -> Figure:
+    """Frames of the simulated walk; of a run that ended early, from its beginning to its end."""
+    wanted = frame_times(account)
+    if run.time[-1] < wanted[-1]:
+        wanted = np.linspace(account.trajectory.time[0], run.time[-1], len(wanted))
+    rows = np.clip(np.searchsorted(run.time, wanted - 1e-9), 0, len(run.time) - 1)
+    shots = pictures(account.robot, run.time[rows], run.T_world_base[rows], run.q[rows], Camera())
+    figure, axes = new_figure(4.9, ROWS, COLUMNS, squeeze=False)
+    for one, time, shot in zip(axes.flat, run.time[rows], shots, strict=True):
+        one.set_axis_off()
+        one.imshow(shot)
+        one.set_title(f"{time:.2f} s", fontsize=8.5, pad=3)
+    return figure
+
+
+def frames_drawn(account: Account) -> Figure:
+    """Frames of the planned walk from the robot's right, drawn from the boxes of its table."""
+    trajectory, robot = account.trajectory, account.robot
+    figure, axes = new_figure(5.4, ROWS, COLUMNS, squeeze=False, sharey=True)
+    samples = [int(np.abs(trajectory.time - time).argmin()) for time in frame_times(account)]
+    outlines = [_outlines(robot, trajectory.T_world_base[i], trajectory.q[i]) for i in samples]
+    reach = max(np.abs(outline[:, 0]).max() for frame in outlines for _, _, outline in frame)
+    top = max(outline[:, 1].max() for frame in outlines for _, _, outline in frame)
+    colours = _link_colours(account)
+    for one, i, frame in zip(axes.flat, samples, outlines, strict=True):
+        _draw(one, frame, colours)
+        one.set_xlim(-1.1 * reach, 1.1 * reach)
+        one.set_ylim(-0.02 * top, 1.04 * top)
+        one.set_aspect("equal")
+        one.set_axis_off()
+        one.set_title(f"{trajectory.time[i]:.2f} s", fontsize=8.5, pad=3)
+    return figure
+
+
+def _draw(axes: Axes, frame: Sequence[tuple[str, float, Array]], colours: dict[str, str]) -> None:
+    axes.axhline(0.0, color="#888888", linewidth=0.8)
+    for link, _, outline in sorted(frame, key=lambda item: item[1], reverse=True):
+        colour = colours[link]
+        if len(outline) > 2:
+            axes.fill(*outline.T, facecolor=colour, edgecolor="white", linewidth=0.7)
+        else:
+            axes.plot(*outline.T, color=colour, linewidth=2.5, solid_capstyle="round")
+
+
+def _outlines(robot: Robot, T_world_base: Array, q: Array) -> list[tuple[str, float, Array]]:
+    """Link, distance from the viewer and outline (k, 2) [m] of every box, seen from the right of the waist.
+
+    A link without a box is the line from its joint to the joints and tips that it carries.
+    """
+    T = pose_from_array(T_world_base)
+    poses = [T @ D for D in link_displacements(robot, unstack(q))]
+    heading = np.array([T_world_base[0, 0], T_world_base[1, 0]])
+    forward = np.append(heading / max(float(np.linalg.norm(heading)), 1e-9), 0.0)
+    view = np.array([forward, [0.0, 0.0, 1.0], np.array([-forward[1], forward[0], 0.0])])
+    origin = np.array([T_world_base[0, 3], T_world_base[1, 3], 0.0])
+    found = []
+    for link, pose in zip(robot.links, poses, strict=True):
+        D = as_array(pose)
+        for points in _solids(robot, link.name):
+            seen = (points @ D[:3, :3].T + D[:3, 3] - origin) @ view.T
+            flat = convex_hull(seen[:, :2]) if len(points) == 8 else seen[:, :2]
+            found.append((link.name, float(seen[:, 2].mean()), flat))
+    return found
+
+
+def _solids(robot: Robot, name: str) -> list[Array]:
+    """Corners (8, 3) of a link's boxes; without boxes the ends (2, 3) of the lines that it bears."""
+    boxes = robot.link(name).boxes
+    if boxes:
+        signs = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, -1).T
+        return [as_array(box.center) + signs * as_array(box.size) for box in boxes]
+    if name not in robot.joint_above:
+        return []
+    start = as_array(robot.joints[robot.joint_above[name]].screw.s0)
+    ends = [as_array(joint.screw.s0) for joint in robot.joints if joint.parent == name]
+    ends += [as_array(limb.frame.p) for limb in robot.limbs if limb.link == name]
+    return [np.stack([start, end]) for end in ends if np.linalg.norm(end - start) > 1e-6]
+
+
+def _link_colours(account: Account) -> dict[str, str]:
+    """Limbs in their colours, all else in grey."""
+    colours = dict.fromkeys(account.robot.link_names, "#8A8F98")
+    for limb in account.robot.limbs:
+        for i in account.robot.path_to(limb.link):
+            colours[account.robot.joints[i].child] = limb_colours(account)[limb.name]
+    return colours

@@ -1,0 +1,123 @@
+"""Pictures of the motion: feet, waist and joint angles."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from screwkin.report.account import Account
+from screwkin.report.style import (
+    LINES,
+    WAIST,
+    Figure,
+    foot_colours,
+    legend_above,
+    new_figure,
+    shade_swings,
+    shown,
+    time_axis,
+)
+
+AXES = ("x", "y", "z")
+_STILL = 1e-3  # m: a channel that moves less is not worth a picture of its own
+
+
+def feet_along_x(account: Account) -> Figure:
+    """Feet against time along x, and along y where they move sideways."""
+    T = account.trajectory.T_world_tip
+    sideways = any(np.ptp(T[foot][:, 1, 3]) > _STILL for foot in account.trajectory.feet)
+    axes_shown = (0, 1) if sideways else (0,)
+    figure, axes = new_figure(1.2 + 1.9 * len(axes_shown), len(axes_shown), sharex=True, squeeze=False)
+    for axis, one in zip(axes_shown, axes[:, 0], strict=True):
+        _feet(account, one, axis, 1.0)
+        one.set_ylabel(f"{AXES[axis]} of the feet [m]")
+    time_axis(axes[-1, 0], account)
+    legend_above(figure, list(axes[:, 0]))
+    return figure
+
+
+def feet_along_z(account: Account) -> Figure:
+    """Height of the feet against time."""
+    figure, axes = new_figure(2.8)
+    _feet(account, axes, 2, 1e3)
+    axes.set_ylabel("height of the feet [mm]")
+    axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+    time_axis(axes, account)
+    legend_above(figure, [axes])
+    return figure
+
+
+def _feet(account: Account, axes: object, axis: int, scale: float) -> None:
+    shade_swings(axes, account)
+    for foot, colour in foot_colours(account).items():
+        value = scale * account.trajectory.T_world_tip[foot][:, axis, 3]
+        axes.plot(account.trajectory.time, value, color=colour, label=shown(foot))  # type: ignore[attr-defined]
+
+
+def waist_along_x(account: Account) -> Figure:
+    """The waist against time along x, and its speed."""
+    trajectory = account.trajectory
+    figure, (place, speed) = new_figure(3.9, 2, sharex=True, height_ratios=(3, 2))
+    shade_swings(place, account)
+    place.plot(trajectory.time, trajectory.T_world_base[:, 0, 3], color=WAIST, label="waist")
+    place.set_ylabel("x of the waist [m]")
+    shade_swings(speed, account)
+    speed.plot(trajectory.time, 1e3 * trajectory.base_twist[:, 3], color=WAIST, linewidth=1.1)
+    speed.set_ylabel("its speed [mm/s]")
+    time_axis(speed, account)
+    legend_above(figure, [place])
+    return figure
+
+
+def waist_along_y(account: Account) -> Figure:
+    """The waist's sway against time, with the feet between which it sways."""
+    trajectory = account.trajectory
+    figure, axes = new_figure(2.8)
+    shade_swings(axes, account)
+    for foot, colour in foot_colours(account).items():
+        y = 1e3 * trajectory.T_world_tip[foot][:, 1, 3]
+        axes.plot(trajectory.time, y, color=colour, linewidth=1.0, linestyle="--", label=shown(foot))
+    axes.plot(trajectory.time, 1e3 * trajectory.T_world_base[:, 1, 3], color=WAIST, label="waist")
+    axes.set_ylabel("y of waist and feet [mm]")
+    time_axis(axes, account)
+    legend_above(figure, [axes])
+    return figure
+
+
+def joint_angles(account: Account, kind: str = "leg") -> Figure | None:
+    """Joint angles of all legs (or arms), one panel per limb with the same scale; None without such limbs."""
+    robot, trajectory = account.robot, account.trajectory
+    limbs = [limb for limb in robot.limbs if limb.kind == kind]
+    if not limbs:
+        return None
+    figure, axes = new_figure(0.9 + 2.3 * len(limbs), len(limbs), sharex=True, sharey=True, squeeze=False)
+    for limb, one in zip(limbs, axes[:, 0], strict=True):
+        shade_swings(one, account)
+        joints = robot.path_to(limb.link)
+        common = _common_prefix([robot.joints[i].name for i in joints])
+        for k, i in enumerate(joints):
+            revolute = robot.joints[i].type != "prismatic"
+            value = np.degrees(trajectory.q[:, i]) if revolute else 1e3 * trajectory.q[:, i]
+            name = shown(robot.joints[i].name[len(common) :])
+            one.plot(trajectory.time, value, color=_hue(k), linestyle=LINES[k % 2], label=name)
+        one.set_ylabel(f"{shown(limb.name)} [deg]")
+    time_axis(axes[-1, 0], account)
+    legend_above(figure, list(axes[:, 0]), columns=4)
+    return figure
+
+
+_HUES = ("#222222", "#56B4E9", "#CC79A7", "#009E73", "#E69F00", "#0072B2")
+
+
+def _hue(k: int) -> str:
+    return _HUES[k % len(_HUES)]
+
+
+def _common_prefix(names: list[str]) -> str:
+    """What all names begin with, up to an underscore: ``right_`` of right_knee and right_hip."""
+    if len(names) < 2:
+        return ""
+    first, last = min(names), max(names)
+    same = next(
+        (i for i, (a, b) in enumerate(zip(first, last, strict=False)) if a != b), min(map(len, names))
+    )
+    return first[: first.rfind("_", 0, same) + 1]

@@ -1,0 +1,129 @@
+"""The numbers of an account: as JSON data, and as rows of name, value, unit and remark."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from screwkin.analysis.validate import Validation
+from screwkin.report.account import Account
+
+
+class Number(NamedTuple):
+    """One line of a table of numbers."""
+
+    name: str
+    value: str
+    remark: str = ""
+
+
+def balance_data(account: Account) -> dict[str, Any]:
+    """ZMP, margin and spikes as JSON data."""
+    balance = account.balance
+    return {
+        "min_margin_mm": 1e3 * float(balance.margin.min()),
+        "max_gcom_zmp_mm": 1e3 * float(balance.distance.max()),
+        "max_cart_table_zmp_mm": 1e3 * float(_gap(balance.cart_table, balance.zmp).max()),
+        "outside_fraction": float(account.outside.mean()),
+        "spikes": [{"time": s.time, "distance_mm": 1e3 * s.distance} for s in balance.spikes],
+    }
+
+
+def walk_data(account: Account) -> dict[str, Any]:
+    """What ``walk`` tells of a trajectory, as JSON data."""
+    trajectory = account.trajectory
+    return {
+        "robot": account.robot.name,
+        "samples": trajectory.samples,
+        "duration": trajectory.duration,
+        "steps": account.steps,
+        **balance_data(account),
+        "max_closure": account.max_closure,
+        "closure": {tip: {"m": gap, "rad": angle} for tip, (gap, angle) in account.closure.items()},
+        "singular": account.singular_samples,
+        "limbs": {
+            limb.limb: {"sigma": limb.sigma, "near": limb.near, "cause": limb.cause} for limb in account.limbs
+        },
+        "warnings": list(account.warnings),
+        "trajectory_sha256": trajectory.sha256,
+    }
+
+
+def balance_numbers(account: Account) -> list[Number]:
+    """ZMP, margin and spikes."""
+    balance, time = account.balance, account.trajectory.time
+    low, far = int(balance.margin.argmin()), int(balance.distance.argmax())
+    outside = 100 * float(account.outside.mean())
+    return [
+        Number("smallest margin of the ZMP", _mm(balance.margin[low]), f"at {time[low]:.2f} s"),
+        Number("samples with the ZMP outside", f"{outside:.1f} %", "would tip over" if outside else ""),
+        Number("largest |GCoM - ZMP|", _mm(balance.distance[far]), f"at {time[far]:.2f} s"),
+        Number(
+            "cart-table ZMP against this one", _mm(_gap(balance.cart_table, balance.zmp).max()), "largest"
+        ),
+        Number("spikes of |GCoM - ZMP|", str(len(balance.spikes)), _times(account)),
+    ]
+
+
+def walk_numbers(account: Account) -> list[Number]:
+    """What ``walk`` tells of a trajectory."""
+    trajectory = account.trajectory
+    steps = "" if account.steps is None else f"{account.steps} steps"
+    rows = [
+        Number(
+            "duration", f"{trajectory.duration:.2f} s", f"{trajectory.samples} samples; {steps}".strip("; ")
+        ),
+        *balance_numbers(account),
+        Number("closure of the loops", f"{account.max_closure:.1e}", "m and rad, largest"),
+        Number("singular samples", str(account.singular_samples)),
+    ]
+    if account.limbs:
+        limb = min(account.limbs, key=lambda limb: limb.sigma)
+        at = f"{limb.limb} at {trajectory.time[limb.sample]:.2f} s; below 0.02 is near singular"
+        rows.append(Number("least singular value", f"{limb.sigma:.3f}", at))
+    fastest = max(account.speed_use, key=lambda name: account.speed_use[name])
+    if account.speed_use[fastest] > 0:
+        rows.append(
+            Number("fastest joint", f"{100 * account.speed_use[fastest]:.0f} %", f"of its limit: {fastest}")
+        )
+    return rows
+
+
+def validation_numbers(check: Validation) -> list[Number]:
+    """What a simulation tells."""
+    rows = [
+        Number("engine", check.engine),
+        Number("fell", "no" if check.fell_at is None else f"at {check.fell_at:.2f} s"),
+        Number("distance", f"{check.distance:.3f} m", f"planned {check.planned_distance:.3f} m"),
+        Number("error at the end", f"{check.end_error_mm:.2f} mm", f"heading {check.end_turn_deg:.2f} deg"),
+        Number("largest slip of a bearing sole", f"{check.slip_mm:.2f} mm"),
+        Number("largest tilt", f"{check.max_tilt_deg:.2f} deg"),
+    ]
+    if check.zmp_rms_xy_mm is not None and check.zmp_max_xy_mm is not None:
+        (x, y), (most_x, most_y) = check.zmp_rms_xy_mm, check.zmp_max_xy_mm
+        rows.append(Number("contact ZMP against plan, RMS", f"{x:.2f} / {y:.2f} mm", "x / y, 50 ms mean"))
+        rows.append(Number("contact ZMP against plan, largest", f"{most_x:.2f} / {most_y:.2f} mm", "x / y"))
+    if check.torque_use:
+        name = max(check.torque_use, key=lambda joint: check.torque_use[joint])
+        rows.append(
+            Number("largest torque", f"{100 * check.torque_use[name]:.0f} %", f"of its limit: {name}")
+        )
+    return rows
+
+
+def _gap(a: Any, b: Any) -> Any:
+    return np.linalg.norm(a - b, axis=1)
+
+
+def _mm(value: float) -> str:
+    return f"{1e3 * value:.1f} mm"
+
+
+def _times(account: Account, most: int = 12) -> str:
+    """When the spikes are, phase within a step where the steps are known."""
+    spikes = account.balance.spikes
+    if not spikes:
+        return ""
+    told = ", ".join(f"{spike.time:.2f}" for spike in spikes[:most])
+    return f"at {told}{', …' if len(spikes) > most else ''} s"

@@ -1,0 +1,131 @@
+"""One style for all pictures: colours by limb, shaded swings, legends outside the data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from screwkin.files import atomic_path
+from screwkin.report.account import Account
+
+Figure = Any
+Axes = Any
+
+SIDES = ("#D55E00", "#0072B2", "#009E73", "#8B5FBF", "#997700", "#CC3377")
+"""Colours of limbs of one kind in table order: right and left are told apart also by the colour-blind."""
+WAIST, GCOM, ZMP, MEASURED, PLAIN, GOOD = "#333333", "#009E73", "#AA3377", "#E69F00", "#555555", "#E8EEE8"
+LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)))
+
+WIDTH, DPI = 8.4, 130
+
+STYLE: Mapping[str, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "axes.labelsize": 9.0,
+    "axes.edgecolor": "#888888",
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.grid.axis": "y",
+    "axes.axisbelow": True,
+    "grid.color": "#E4E4E4",
+    "grid.linewidth": 0.6,
+    "lines.linewidth": 1.5,
+    "xtick.color": "#555555",
+    "ytick.color": "#555555",
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "figure.facecolor": "white",
+    "savefig.facecolor": "white",
+    "svg.hashsalt": "screwkin",
+}
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Pictures drawn inside have the style; nothing global remains changed."""
+    import matplotlib
+
+    style: Any = dict(STYLE)
+    with matplotlib.rc_context(style):
+        yield
+
+
+def new_figure(height: float, rows: int = 1, columns: int = 1, **options: Any) -> tuple[Figure, Any]:
+    """A figure without window or global state, and its axes (an array if there are several)."""
+    from matplotlib.figure import Figure as Canvas
+
+    figure = Canvas(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
+    return figure, figure.subplots(rows, columns, **options)
+
+
+def save_figure(figure: Figure, path: Path) -> Path:
+    """Write a figure as PNG; the same data give the same bytes.
+
+    Raises:
+        OutputError: it cannot be written.
+    """
+    with atomic_path(path) as beside:
+        figure.savefig(beside, format="png", dpi=DPI, metadata={"Software": None})
+    return path
+
+
+def shown(name: str) -> str:
+    """A name for people: ``right_foot`` reads right foot."""
+    return name.replace("_", " ")
+
+
+def foot_colours(account: Account) -> dict[str, str]:
+    """Colour of every foot, by its tip's name."""
+    return dict(zip(account.trajectory.feet, SIDES, strict=False))
+
+
+def limb_colours(account: Account) -> dict[str, str]:
+    """Colour of every limb: the k-th leg and the k-th arm share theirs."""
+    colours: dict[str, str] = {}
+    for kind in ("leg", "arm"):
+        names = [limb.name for limb in account.robot.limbs if limb.kind == kind]
+        colours |= {name: SIDES[k % len(SIDES)] for k, name in enumerate(names)}
+    return colours
+
+
+def shade_swings(axes: Axes, account: Account) -> None:
+    """Tint the times at which a foot is in the air with that foot's colour; mark where steps begin."""
+    time, contact = account.trajectory.time, account.trajectory.contact
+    for k, (foot, colour) in enumerate(foot_colours(account).items()):
+        for n, (begin, end) in enumerate(spans(~contact[:, k])):
+            label = f"{shown(foot)} in the air" if n == 0 else None
+            axes.axvspan(time[begin], time[end], color=colour, alpha=0.09, linewidth=0, label=label)
+    for boundary in account.boundaries[1:-1]:
+        axes.axvline(boundary, color="#BBBBBB", linewidth=0.6, zorder=0.6)
+
+
+def time_axis(axes: Axes, account: Account) -> None:
+    """The axis of time, exactly as long as the motion."""
+    axes.set_xlim(account.trajectory.time[0], account.trajectory.time[-1])
+    axes.set_xlabel("time [s]")
+
+
+def spans(flags: Any) -> list[tuple[int, int]]:
+    """First and last index of every run of true flags; a run is drawn up to the sample after it."""
+    edges = np.flatnonzero(
+        np.diff(np.concatenate([[False], np.asarray(flags, dtype=bool), [False]]).astype(int))
+    )
+    return [(int(a), min(int(b), len(flags) - 1)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def legend_above(figure: Figure, axes: Sequence[Axes], columns: int = 6) -> None:
+    """One legend for all axes, above them, every label once."""
+    entries: dict[str, Any] = {}
+    for one in axes:
+        for handle, label in zip(*one.get_legend_handles_labels(), strict=True):
+            entries.setdefault(label, handle)
+    if entries:
+        figure.legend(
+            entries.values(), entries.keys(), loc="outside upper left", ncols=min(columns, len(entries))
+        )

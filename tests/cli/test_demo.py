@@ -1,0 +1,80 @@
+"""``demo``: the whole story, told once, with a report at its end."""
+
+import json
+
+import pytest
+
+
+@pytest.fixture(scope="module")
+def shown(tmp_path_factory):
+    """A short demo: exit code, story and folder."""
+    import contextlib
+    import io
+
+    from screwkin.cli import run
+
+    folder = tmp_path_factory.mktemp("demo") / "out"
+    story = io.StringIO()
+    with contextlib.redirect_stdout(story):
+        code = run(["demo", "--gait", "paper", "--steps", "2", "-o", str(folder)])
+    return code, story.getvalue(), folder
+
+
+def test_the_default_robot_walks_and_the_story_names_every_stage(shown):
+    code, story, folder = shown
+    assert code == 0
+    for part in (
+        "right_knee",
+        "mobility 24",
+        "gait paper",
+        "smallest margin",
+        "pybullet",
+        "It walks: passed.",
+    ):
+        assert part in story
+    assert str(folder / "report.html") in story
+
+
+def test_the_folder_holds_trajectory_verdict_film_and_report(shown):
+    _, _, folder = shown
+    names = {path.name for path in folder.iterdir()}
+    assert {"trajectory.npz", "trajectory.csv", "validation.json", "walk.gif", "report.html"} <= names
+    assert not [name for name in names if name.startswith(".")]
+    assert json.loads((folder / "validation.json").read_text(encoding="utf-8"))["passed"]
+
+
+def test_a_walk_that_falls_ends_with_3_and_json_alone_on_stdout(cli, tmp_path):
+    gait = tmp_path / "stiff.toml"
+    from screwkin.model.library import find_gait
+
+    text = find_gait("paper").read_text(encoding="utf-8")
+    gait.write_text(text.replace("sway = 1.0", "sway = 0.0"), encoding="utf-8")
+    called = cli("demo", "--gait", gait, "--steps", 2, "-o", "out", "--json")
+    assert called.code == 3
+    assert called.err == ""
+    assert called.data["passed"] is False
+    assert called.data["mobility"] == 24
+    assert called.data["reasons"]
+
+
+def test_without_the_simulator_the_report_still_tells_the_rest(cli, monkeypatch, tmp_path):
+    import screwkin.cli.simulation
+    from screwkin.errors import MissingDependencyError
+
+    def absent(*_, **__):
+        raise MissingDependencyError("pybullet is not installed: pip install pybullet")
+
+    monkeypatch.setattr(screwkin.cli.simulation, "validated", absent)
+    called = cli("demo", "--steps", 1, "-o", "out")
+    assert called.code == 2
+    assert "pip install pybullet" in called.err
+    assert "The report stops before the simulation" in called.err
+    assert (tmp_path / "out" / "report.html").exists()
+    assert not (tmp_path / "out" / "validation.json").exists()
+
+
+def test_a_robot_that_cannot_walk_is_refused(cli, refused, tmp_path):
+    called = cli("demo", "linkages/four-bar")
+    assert called.code == 2
+    assert "legs" in called.err
+    assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,92 @@
+"""``info``: the counts of the mechanism, and conditioning that does not depend on where the robot stands."""
+
+import pytest
+
+COUNTS = {
+    "bioloid": {
+        "actuated_joints": 18,
+        "couplings": 48,
+        "links": 45,
+        "circuits": 4,
+        "mobility": 24,
+        "network_shape": [24, 48],
+        "rank": 24,
+    },
+    "bioloid24": {
+        "actuated_joints": 24,
+        "couplings": 54,
+        "links": 51,
+        "circuits": 4,
+        "mobility": 30,
+        "network_shape": [24, 54],
+        "rank": 24,
+    },
+    "linkages/four-bar": {"actuated_joints": 1, "couplings": 4, "links": 4, "circuits": 1, "mobility": 1},
+    "linkages/bennett": {"couplings": 4, "circuits": 1, "mobility": 1, "kutzbach": -2},
+    "linkages/stewart": {"actuated_joints": 6, "mobility": 6},
+}
+
+
+@pytest.mark.parametrize("name", COUNTS)
+def test_the_counts_are_those_of_the_mechanism(cli, name):
+    told = cli("info", name, "--json").data
+    assert {key: told[key] for key in COUNTS[name]} == COUNTS[name]
+    assert sorted(told["primary"] + told["secondary"]) == sorted(set(told["primary"] + told["secondary"]))
+    assert len(told["primary"]) + len(told["secondary"]) == told["couplings"]
+
+
+def test_mass_and_choice_of_couplings_are_those_of_the_table(cli):
+    told = cli("info", "bioloid", "--json").data
+    assert told["mass"] == pytest.approx(1.7, abs=1e-12)
+    assert [name for name in told["secondary"] if "." in name] == [
+        f"{side}_hand.r{axis}" for side in ("right", "left") for axis in "xyz"
+    ]
+    assert all("." in name for name in told["primary"])
+
+
+def test_conditioning_stays_50_m_away_unless_n_is_formed_at_the_world_origin(cli):
+    home = cli("info", "bioloid", "--json").data["condition"]
+    away = cli("info", "bioloid", "--at", "50,0,0", "--json").data["condition"]
+    spoilt = cli("info", "bioloid", "--at", "50,0,0", "--point", "0,0,0", "--json").data["condition"]
+    assert 50 < home < 200
+    assert away == pytest.approx(home, rel=1e-12)
+    assert spoilt > 1e5
+
+
+def test_straight_knees_are_singular_although_n_keeps_its_rank(cli):
+    told = cli("info", "bioloid", "--posture", "zero", "--json").data
+    assert told["rank"] == 24
+    assert told["mobility"] == 24
+    leg = next(limb for limb in told["singularity"] if limb["limb"] == "left_leg")
+    assert leg["near"]
+    assert "left_knee is near straight" in leg["cause"]
+    assert not any(limb["near"] for limb in cli("info", "bioloid", "--json").data["singularity"])
+    assert "NEAR A SINGULARITY" in cli("info", "bioloid", "--posture", "zero").out
+
+
+def test_the_text_tells_the_same_numbers(cli):
+    text = cli("info", "bioloid").out
+    for part in ("1.7000 kg", "48: 18 real, 30 virtual", "24 x 48, rank 24", "waist.px py pz rx ry rz"):
+        assert part in text
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["bioloid25"], "unknown robot 'bioloid25'; valid: bioloid"),
+        (["./absent.toml"], "absent.toml"),
+        (["bioloid", "--posture", "dancing"], "unknown posture 'dancing'; valid: "),
+        (["bioloid", "--at", "1,2"], "--at '1,2' is no place"),
+        (["bioloid", "--at", "0,nan,0"], "NaN"),
+        (["bioloid", "--point", "a,b,c"], "--point"),
+    ],
+)
+def test_wrong_input_is_told_once(cli, refused, words, named):
+    assert named in refused(cli("info", *words), 2)
+
+
+def test_every_fault_of_a_table_is_told(cli, refused, tmp_path):
+    (tmp_path / "bad.toml").write_text('[robot]\nname = "bad"\nspeed = 3\n', encoding="utf-8")
+    message = refused(cli("info", "./bad.toml"), 2)
+    assert "speed" in message
+    assert message.count("bad.toml") > 1

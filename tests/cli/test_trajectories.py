@@ -1,0 +1,223 @@
+"""``zmp`` and ``validate`` on sound, bad and foreign trajectory files."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import screwkin as sk
+
+
+@pytest.fixture
+def changed(walked, tmp_path):
+    """A copy of the walk with some fields changed: its path."""
+
+    def make(**fields):
+        path = tmp_path / "changed.npz"
+        trajectory = sk.load_trajectory(walked / "trajectory.npz")
+        meta = {**trajectory.meta, **fields.pop("meta", {})}
+        return replace(trajectory, meta=meta, **fields).save(path)
+
+    return make
+
+
+def test_zmp_computes_anew_what_walk_predicted(cli, walked):
+    told = cli("zmp", walked / "trajectory.npz", "--json").data
+    trajectory = sk.load_trajectory(walked / "trajectory.npz")
+    assert told["min_margin_mm"] == pytest.approx(1e3 * trajectory.margin.min(), abs=1e-9)
+    assert told["outside_fraction"] == 0
+    assert {round(spike["time"] % 1, 2) for spike in told["spikes"]} <= {
+        0.86,
+        0.88,
+        0.9,
+        0.08,
+        0.1,
+        0.12,
+        0.14,
+    }
+    assert told["spikes"]
+    assert "smallest margin of the ZMP" in cli("zmp", walked / "trajectory.npz").out
+
+
+def test_zmp_believes_the_joints_not_the_recorded_zmp(cli, changed):
+    path = changed(zmp=np.zeros((201, 2)), margin=np.full(201, 9.0), com=np.zeros((201, 3)))
+    told = cli("zmp", path)
+    assert told.code == 0
+    assert "the recorded ZMP differs" in told.err
+    assert cli("zmp", path, "--json").data["min_margin_mm"] < 100
+
+
+def test_a_zmp_outside_is_an_answer_of_no(cli, tmp_path):
+    assert cli("walk", "bioloid", "--steps", 1, "--set", "sway=0", "--no-plots", "-o", "out").code == 0
+    called = cli("zmp", "out/trajectory.npz", "--json")
+    assert called.code == 3
+    assert called.data["outside_fraction"] > 0
+
+
+def truncated(good, path):
+    path.write_bytes(good[: len(good) // 2])
+
+
+def foreign(good, path):
+    np.savez(path, a=np.zeros(3))
+
+
+def pickled(good, path):
+    np.savez(path, time=np.array([{"a": 1}], dtype=object))
+
+
+def text(good, path):
+    path.write_text("not a zip", encoding="utf-8")
+
+
+def empty(good, path):
+    path.touch()
+
+
+def folder(good, path):
+    path.mkdir()
+
+
+def absent(good, path):
+    pass
+
+
+BAD_FILES = [
+    (truncated, "npz"),
+    (foreign, "not a trajectory of screwkin"),
+    (pickled, "pickled"),
+    (text, "not an npz file"),
+    (empty, "not an npz file"),
+    (folder, "cannot be read"),
+    (absent, "cannot be read"),
+]
+
+
+@pytest.mark.parametrize("verb", ["zmp", "validate"])
+@pytest.mark.parametrize(("spoil", "named"), BAD_FILES, ids=lambda value: getattr(value, "__name__", ""))
+def test_a_bad_file_is_told_once_and_nothing_is_written(cli, refused, walked, tmp_path, verb, spoil, named):
+    path = tmp_path / "bad.npz"
+    spoil((walked / "trajectory.npz").read_bytes(), path)
+    before = sorted(tmp_path.iterdir())
+    message = refused(cli(verb, path), 2)
+    assert named in message
+    assert str(path) in message
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_the_csv_is_not_enough(cli, refused, walked):
+    assert "give the .npz" in refused(cli("zmp", walked / "trajectory.csv"), 2)
+
+
+@pytest.mark.parametrize("verb", ["zmp", "validate"])
+@pytest.mark.parametrize(
+    ("robot", "named"),
+    [
+        (None, "no robot table"),
+        ("bioloid", "no robot table"),
+        ({"table": "[robot]", "sha256": "0"}, "SHA-256"),
+        ({"table": 3, "sha256": "0"}, "no robot table"),
+    ],
+)
+def test_a_trajectory_whose_robot_was_changed_is_refused(cli, refused, changed, verb, robot, named):
+    assert named in refused(cli(verb, changed(meta={"robot": robot})), 2)
+
+
+def test_a_trajectory_of_another_robot_is_refused(cli, refused, changed):
+    import hashlib
+
+    from screwkin.model.library import find_robot
+
+    table = find_robot("linkages/four-bar").read_text(encoding="utf-8")
+    robot = {"name": "x", "table": table, "sha256": hashlib.sha256(table.encode()).hexdigest()}
+    assert "right_foot" in refused(cli("zmp", changed(meta={"robot": robot})), 2)
+
+
+def test_strange_remarks_in_meta_do_no_harm(cli, changed):
+    path = changed(meta={"boundaries": ["a"], "steps": "many", "closure": None, "notes": 3, "gait": [1]})
+    assert cli("zmp", path).code == 0
+
+
+def test_an_unknown_engine_is_refused_before_anything_is_simulated(cli, refused, walked):
+    message = refused(cli("validate", walked / "trajectory.npz", "--engine", "gazebo"), 2)
+    assert "unknown engine 'gazebo'; valid: pybullet, kinematic" in message
+
+
+def test_a_robot_that_only_follows_orders_never_passes(cli, walked, tmp_path):
+    (tmp_path / "t.npz").write_bytes((walked / "trajectory.npz").read_bytes())
+    called = cli("validate", "t.npz", "--engine", "kinematic", "--no-plots", "--json")
+    assert called.code == 3
+    assert not called.data["passed"]
+    assert "kinematic" in called.data["reasons"][0]
+    assert json.loads((tmp_path / "validation.json").read_text(encoding="utf-8"))["passed"] is False
+
+
+FIELDS = [
+    "passed",
+    "reasons",
+    "fell",
+    "distance",
+    "planned_distance",
+    "end_error_mm",
+    "zmp_rms_mm",
+    "zmp_max_mm",
+    "min_margin_mm",
+    "slip_mm",
+    "trajectory_sha256",
+    "engine",
+]
+
+
+@pytest.fixture(scope="module")
+def validated(walked, tmp_path_factory):
+    """Folder of a walk that PyBullet has played and filmed, and what the command printed."""
+    import contextlib
+    import io
+
+    from screwkin.cli import run
+
+    folder = tmp_path_factory.mktemp("validated")
+    (folder / "trajectory.npz").write_bytes((walked / "trajectory.npz").read_bytes())
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        code = run(["validate", str(folder / "trajectory.npz"), "--video", "--json"])
+    return code, json.loads(printed.getvalue()), folder
+
+
+def test_the_paper_s_walk_passes_and_all_fields_are_told(validated):
+    code, told, _ = validated
+    assert code == 0
+    assert told["passed"] is True
+    assert told["reasons"] == []
+    assert set(FIELDS) <= set(told)
+    assert told["fell"] is False
+    assert told["engine"] == "pybullet"
+    assert told["distance"] == pytest.approx(0.2, abs=0.002)
+
+
+def test_validation_json_lies_beside_the_trajectory_and_names_it(validated):
+    _, told, folder = validated
+    written = json.loads((folder / "validation.json").read_text(encoding="utf-8"))
+    assert written == {key: value for key, value in told.items() if key != "robot"}
+    assert written["trajectory_sha256"] == sk.load_trajectory(folder / "trajectory.npz").sha256
+
+
+def test_film_plots_and_report_are_made(validated):
+    _, _, folder = validated
+    from PIL import Image
+
+    with Image.open(folder / "walk.gif") as film:
+        assert film.n_frames > 20
+        assert film.info["loop"] == 0
+    names = {path.name for path in folder.iterdir()}
+    assert {"contact_zmp.png", "servos.png", "upright.png", "frames.png", "report.html"} <= names
+    assert "Passed" in (folder / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_walk_without_sway_falls_and_the_reasons_are_told(cli):
+    assert cli("walk", "bioloid", "--steps", 2, "--set", "sway=0", "--no-plots", "-o", "out").code == 0
+    called = cli("validate", "out/trajectory.npz", "--no-plots")
+    assert called.code == 3
+    assert "NOT passed:" in called.out
+    assert "planned ZMP leaves the support polygon" in called.out
