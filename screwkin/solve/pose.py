@@ -17,7 +17,7 @@ from screwkin.errors import InputError, LimitError, ShapeError, SingularError, U
 from screwkin.kinematics.positions import chain_jacobian, successive_displacement
 from screwkin.mechanism.choice import characteristic_length
 from screwkin.mechanism.graph import components
-from screwkin.model.robot import Limb, Robot
+from screwkin.model.robot import Joint, Limb, Robot
 from screwkin.model.state import State
 from screwkin.screw import at
 from screwkin.se3 import as_array, pose_from_array, rotation_log, unstack, vector_from_array
@@ -41,6 +41,8 @@ class PoseSolution:
         limbs: names of the limbs that had a target.
         status: (..., limbs) ``Status`` values.
         residual: (..., limbs) closure error [m and rad, norm].
+        distance: (..., limbs) how far the tip is from its target [m].
+        angle: (..., limbs) how far it is turned from its target [rad]; 0 for a position-only target.
         iterations: (..., limbs).
         worst_joint: (..., limbs) index of the joint furthest beyond its limits.
     """
@@ -49,6 +51,8 @@ class PoseSolution:
     limbs: tuple[str, ...]
     status: Array
     residual: Array
+    distance: Array
+    angle: Array
     iterations: Array
     worst_joint: Array
 
@@ -69,26 +73,27 @@ class PoseSolution:
         sample, limb = (int(i) for i in failed[0])
         flat = {
             name: getattr(self, name).reshape(-1, len(self.limbs))
-            for name in ("status", "residual", "worst_joint")
+            for name in ("status", "distance", "angle", "worst_joint")
         }
         status, name = Status(int(flat["status"][sample, limb])), self.limbs[limb]
         where = f"{name}, sample {sample}" + ("" if time is None else f" (t = {float(time[sample]):.3f} s)")
         more = f"; {len(failed)} of {flat['status'].size} limb positions fail" if len(failed) > 1 else ""
         if status is Status.UNREACHABLE:
-            far = float(flat["residual"][sample, limb])
-            raise UnreachableError(
-                f"{where}: out of reach by {1e3 * far:.3g} mm; {status.help}{more}", name, sample, far
-            )
+            far, turned = float(flat["distance"][sample, limb]), float(flat["angle"][sample, limb])
+            by = f"{1e3 * far:.3g} mm" + (f" and {np.degrees(turned):.2g} deg" if turned > 1e-9 else "")
+            raise UnreachableError(f"{where}: out of reach by {by}; {status.help}{more}", name, sample, far)
         if status is Status.SINGULAR:
             raise SingularError(f"{where}: singular; {status.help}{more}", name, sample)
-        joint = robot.joints[int(flat["worst_joint"][sample, limb])]
-        q = float(
-            np.reshape(self.state.q, (-1, len(robot.joints)))[sample, int(flat["worst_joint"][sample, limb])]
-        )
-        raise LimitError(
-            f"{where}: {joint.name} at {np.degrees(q):.1f} deg, limits {np.degrees(joint.lower):.1f} to "
-            f"{np.degrees(joint.upper):.1f} deg; {status.help}{more}"
-        )
+        worst = int(flat["worst_joint"][sample, limb])
+        q = float(np.reshape(self.state.q, (-1, len(robot.joints)))[sample, worst])
+        raise LimitError(f"{where}: {_beyond(robot.joints[worst], q)}; {status.help}{more}")
+
+
+def _beyond(joint: Joint, q: float) -> str:
+    """A joint's position and limits, in degrees or millimetres."""
+    factor, unit = (1e3, "mm") if joint.type == "prismatic" else (180 / np.pi, "deg")
+    lower, upper = factor * joint.lower, factor * joint.upper
+    return f"{joint.name} at {factor * q:.1f} {unit}, limits {lower:.1f} to {upper:.1f} {unit}"
 
 
 @dataclass(frozen=True)
@@ -129,7 +134,15 @@ def solve_pose(robot: Robot, targets: Mapping[str, Array], guess: State) -> Pose
 
     Returns:
         PoseSolution; nothing is raised for samples without solution.
+
+    Raises:
+        InputError: no tip has a target, or the robot has loops of its own. ShapeError: batches do not fit.
     """
+    if robot.closures:
+        told = ", ".join(closure.name for closure in robot.closures)
+        raise InputError(
+            f"{robot.name} has closures ({told}), which limbs alone do not keep; use close_loops"
+        )
     base = np.asarray(targets.get("base", guess.T_world_base), dtype=float)
     names = [name for name in targets if name != "base"]
     shapes = [base.shape[:-2], guess.q.shape[:-1]]
@@ -147,7 +160,8 @@ def solve_pose(robot: Robot, targets: Mapping[str, Array], guess: State) -> Pose
     if not into:
         raise InputError("no targets; name at least one tip, such as " + ", ".join(robot.tip_names[:2]))
     parts = {
-        name: np.zeros((count, len(into))) for name in ("status", "residual", "iterations", "worst_joint")
+        name: np.zeros((count, len(into)))
+        for name in ("status", "residual", "distance", "angle", "iterations", "worst_joint")
     }
     paths = [robot.path_to(target.limb.link) for target in into]
     shared = np.zeros((len(into), len(robot.joints)), dtype=np.int64)
@@ -163,6 +177,8 @@ def solve_pose(robot: Robot, targets: Mapping[str, Array], guess: State) -> Pose
         tuple(target.limb.name for target in into),
         shaped["status"].astype(int),
         shaped["residual"],
+        shaped["distance"],
+        shaped["angle"],
         shaped["iterations"].astype(int),
         shaped["worst_joint"].astype(int),
     )
@@ -204,20 +220,31 @@ def _solve_block(
         return r * weights, J * weights[:, None]
 
     result = newton(residual, q[:, joints])
-    turning = np.array([robot.joints[i].type != "prismatic" for i in joints])
-    wrapped = (result.x + np.pi) % (2 * np.pi) - np.pi
-    far = turning & (np.abs(result.x) > np.pi)
-    q[:, joints] = np.where(far, wrapped, result.x)
+    q[:, joints] = _unwound([robot.joints[i] for i in joints], result.x, q[:, joints])
     r, J = residual(q[:, joints], np.arange(len(q)))
     sigma = np.linalg.svd(J, compute_uv=False)[:, -1] if offsets[-1] else np.ones(len(q))
     for k, row in enumerate(rows):
         here = slice(offsets[k], offsets[k + 1])
-        parts["residual"][:, row] = np.linalg.norm(r[:, here] / weights[here], axis=1)
+        missing = r[:, here] / weights[here]
+        parts["residual"][:, row] = np.linalg.norm(missing, axis=1)
+        parts["distance"][:, row] = np.linalg.norm(missing[:, -3:], axis=1)
+        parts["angle"][:, row] = np.linalg.norm(missing[:, :-3], axis=1)
         parts["iterations"][:, row] = result.iterations
         closed = parts["residual"][:, row] <= CLOSED
         parts["status"][:, row] = np.where(
             closed, np.where(sigma < SINGULAR, Status.SINGULAR, Status.CONVERGED), Status.UNREACHABLE
         )
+
+
+def _unwound(joints: Sequence[Joint], x: Array, guess: Array) -> Array:
+    """Whole turns of revolute joints taken back: nearest to the guess, or else within the limits."""
+    lower, upper = np.array([j.lower for j in joints]), np.array([j.upper for j in joints])
+    near = x - 2 * np.pi * np.round((x - guess) / (2 * np.pi))
+    wrapped = (x + np.pi) % (2 * np.pi) - np.pi
+    outside = (near < lower) | (near > upper)
+    fits = (wrapped >= lower) & (wrapped <= upper)
+    turned = np.where(outside & fits, wrapped, near)
+    return np.where([j.type == "revolute" for j in joints], turned, x)
 
 
 def _judge(robot: Robot, row: int, path: list[int], q: Array, parts: dict[str, Array]) -> None:
