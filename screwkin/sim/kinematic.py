@@ -17,7 +17,7 @@ class KinematicBackend:
 
     name = "kinematic"
 
-    def __init__(self, robot: Robot, dt: float = 1e-3) -> None:
+    def __init__(self, robot: Robot, dt: float = 0.01) -> None:
         self.dt = dt
         self._robot = robot
         self._legs = [limb.tip for limb in robot.limbs if limb.kind == "leg"]

@@ -67,13 +67,17 @@ def zmp_record(run: Run, trajectory: Trajectory, window: float = WINDOW) -> ZmpR
 
 
 def slip(run: Run, trajectory: Trajectory, legs: tuple[str, ...]) -> Slip:
-    """How far soles move while the plan has them on the floor; ``legs`` names the run's feet."""
+    """How far soles move while the plan has them on the floor; ``legs`` names the run's feet.
+
+    A foot stands between two samples if it stands at both.
+    """
     played = _before_fall(run) & (run.time >= trajectory.time[0]) & (run.time <= trajectory.time[-1])
-    sample = np.searchsorted(trajectory.time, run.time[played] + 1e-9, side="right") - 1
+    after = np.minimum(np.searchsorted(trajectory.time, run.time[played]), trajectory.samples - 1)
+    standing = trajectory.contact & np.roll(trajectory.contact, 1, axis=0)
     largest = total = turned = 0.0
     for i, foot in enumerate(legs):
         T = run.T_world_foot[played, i]
-        for first, last in _stretches(trajectory.contact[sample, trajectory.feet.index(foot)]):
+        for first, last in _stretches(standing[after, trajectory.feet.index(foot)]):
             total += float(np.linalg.norm(T[last - 1, :2, 3] - T[first, :2, 3]))
             tenth = (last - first) // 10
             middle = T[first + tenth : last - tenth]

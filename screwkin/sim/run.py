@@ -100,7 +100,7 @@ def simulate(
             progress((k + 1) / count)
         if fallen_at is None and _has_fallen(seen[-1].T_world_base, planned[k + 1], rule):
             fallen_at = now
-        if fallen_at is not None and now >= fallen_at + rule.aftermath:
+        if fallen_at is not None and now > fallen_at + rule.aftermath - dt / 2:
             break
     rows = len(seen)
     return Run(

@@ -1,0 +1,200 @@
+"""Good walks pass, bad ones fail for the reasons that they have."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import screwkin as sk
+from screwkin.analysis.validate import Criteria, Validation, judged, validate
+from screwkin.errors import InputError, UnknownNameError
+from screwkin.model.robot import Robot
+from screwkin.sim.camera import Camera
+from screwkin.sim.kinematic import KinematicBackend
+from screwkin.sim.run import Run, simulate
+from screwkin.trajectory import Trajectory
+
+FIELDS = {
+    *(
+        "passed",
+        "reasons",
+        "fell",
+        "distance",
+        "planned_distance",
+        "end_error_mm",
+        "zmp_rms_mm",
+        "zmp_max_mm",
+    ),
+    *("min_margin_mm", "slip_mm", "trajectory_sha256", "engine"),
+}
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return sk.load_robot("bioloid")
+
+
+def planned(robot: Robot, steps: int = 2, **settings: Any) -> Trajectory:
+    return sk.walk(robot, sk.load_gait("walk").replace(**settings), steps=steps)
+
+
+@pytest.fixture(scope="module")
+def walk(robot: Robot) -> Trajectory:
+    return planned(robot, Tc=0.8)
+
+
+@pytest.fixture(scope="module")
+def perfect(robot: Robot, walk: Trajectory) -> Run:
+    """The plan carried out to the letter, in the name of an engine with forces."""
+    run = simulate(robot, walk, KinematicBackend(robot, dt=0.01))
+    return replace(run, engine="pybullet")
+
+
+@pytest.fixture(scope="module")
+def check(robot: Robot, walk: Trajectory) -> Validation:
+    pytest.importorskip("pybullet")
+    return validate(robot, walk, camera=Camera(pictures=3, width=80, height=60))
+
+
+def test_a_walk_passes_and_contacts_agree_with_the_plan(check: Validation) -> None:
+    assert check.passed
+    assert check.reasons == ()
+    assert not check.fell
+    assert check.end_error_mm < 2.0
+    assert check.slip_mm < 1.0
+    assert check.zmp_rms_xy_mm is not None
+    assert check.zmp_max_xy_mm is not None
+    assert max(check.zmp_rms_xy_mm) == check.zmp_rms_mm <= 1.0
+    assert max(check.zmp_max_xy_mm) == check.zmp_max_mm <= 5.0
+
+
+def test_ankle_sensors_tell_the_same_zmp_as_the_contacts(check: Validation) -> None:
+    """They leave out only the momentum of the feet's own 32 g."""
+    assert check.ankle_rms_xy_mm is not None
+    assert 0.0 < max(check.ankle_rms_xy_mm) < 0.4
+
+
+def test_the_contacts_follow_the_multibody_zmp_and_not_the_centre_of_mass(
+    check: Validation, walk: Trajectory
+) -> None:
+    """Were the comparison blind, the ground projection of the CoM would fit as well."""
+    com = np.stack([np.interp(check.zmp.time, walk.time, walk.com[:, i]) for i in (0, 1)], axis=1)
+    wrong = 1e3 * np.sqrt(np.mean((check.zmp.contact - com) ** 2, axis=0))
+    assert wrong.min() > 5.0
+
+
+def test_the_verdict_is_json_with_the_fields_of_the_contract(check: Validation, walk: Trajectory) -> None:
+    data = json.loads(json.dumps(check.to_dict(), allow_nan=False))
+    assert set(data) >= FIELDS
+    assert data["trajectory_sha256"] == walk.sha256
+    assert data["engine"] == "pybullet"
+    assert data["planned_distance"] == pytest.approx(walk.T_world_base[-1, 0, 3] - walk.T_world_base[0, 0, 3])
+    assert data["distance"] == pytest.approx(data["planned_distance"], abs=1e-3)
+    assert data["min_margin_mm"] == pytest.approx(1e3 * walk.margin.min())
+    assert set(data["torque_use"]) == set(walk.joint_names)
+    assert 0.2 < max(data["torque_use"].values()) < 1.0
+
+
+def test_pictures_are_taken_when_a_camera_is_given(check: Validation) -> None:
+    assert [picture.shape for picture in check.pictures] == [(60, 80, 3)] * 3
+    assert not np.array_equal(check.pictures[0], check.pictures[2])
+
+
+def test_servos_that_would_have_to_be_faster_are_a_warning_and_no_reason(check: Validation) -> None:
+    assert check.speed_use["right_knee"] > 1.0
+    assert "right_knee" in check.warnings[0]
+    assert "6.0 rad/s" in check.warnings[0]
+
+
+def test_a_hurried_walk_falls_with_all_its_reasons(robot: Robot) -> None:
+    pytest.importorskip("pybullet")
+    check = validate(robot, planned(robot, steps=4, Tc=0.5))
+    assert not check.passed
+    assert check.fell
+    assert check.fell_at is not None
+    assert check.zmp.time[-1] < check.fell_at
+    text = "\n".join(check.reasons)
+    for reason in ("fell at", "end error", "planned ZMP leaves the support polygon"):
+        assert reason in text
+
+
+def test_weak_servos_do_not_carry_the_robot(robot: Robot, walk: Trajectory) -> None:
+    pytest.importorskip("pybullet")
+    weak = replace(robot, joints=tuple(replace(joint, effort=0.3) for joint in robot.joints))
+    check = validate(weak, walk)
+    assert check.fell
+    assert any("torque at the servo's limit for 50 ms" in reason for reason in check.reasons)
+
+
+def test_the_kinematic_engine_tracks_exactly_but_confirms_nothing(robot: Robot, walk: Trajectory) -> None:
+    check = validate(robot, walk, engine="kinematic")
+    assert not check.passed
+    assert check.reasons == ("engine kinematic simulates no forces and confirms nothing; use pybullet",)
+    assert check.end_error_mm < 1e-9
+    assert check.zmp_rms_mm is None
+    assert check.zmp_max_mm is None
+
+
+def verdict(robot: Robot, walk: Trajectory, run: Run) -> tuple[str, ...]:
+    return judged(robot, walk, run, Criteria()).reasons
+
+
+def test_the_plan_itself_gives_no_reason(robot: Robot, walk: Trajectory, perfect: Run) -> None:
+    assert verdict(robot, walk, perfect) == ()
+
+
+@pytest.mark.parametrize(("off", "fails"), [(0.0099, False), (0.0101, True)])
+def test_the_end_may_be_10_mm_off(
+    robot: Robot, walk: Trajectory, perfect: Run, off: float, fails: bool
+) -> None:
+    T = perfect.T_world_base.copy()
+    T[-1, 1, 3] += off
+    reasons = verdict(robot, walk, replace(perfect, T_world_base=T))
+    assert any(reason.startswith("end error") for reason in reasons) is fails
+
+
+def test_on_a_long_way_the_end_may_be_5_percent_off(robot: Robot, walk: Trajectory, perfect: Run) -> None:
+    """A plan twenty times as long, 0.2 m times 20: 200 mm are allowed."""
+    far = walk.T_world_base.copy()
+    far[:, 0, 3] = 20 * far[:, 0, 3]
+    T = perfect.T_world_base.copy()
+    T[-1, 0, 3] = far[-1, 0, 3] + 0.19
+    long = replace(walk, T_world_base=far)
+    assert verdict(robot, long, replace(perfect, T_world_base=T)) == ()
+    T[-1, 0, 3] += 0.02
+    assert "allowed 200.0 mm" in verdict(robot, long, replace(perfect, T_world_base=T))[0]
+
+
+@pytest.mark.parametrize(("creep", "fails"), [(0.009, False), (0.011, True)])
+def test_a_stance_foot_may_slip_10_mm(
+    robot: Robot, walk: Trajectory, perfect: Run, creep: float, fails: bool
+) -> None:
+    T = perfect.T_world_foot.copy()
+    T[perfect.time > 0.5, 1, 1, 3] += creep
+    reasons = verdict(robot, walk, replace(perfect, T_world_foot=T))
+    assert any("slips" in reason for reason in reasons) is fails
+
+
+def test_a_plan_whose_zmp_leaves_the_soles_fails_even_if_it_stands(
+    robot: Robot, walk: Trajectory, perfect: Run
+) -> None:
+    margin = walk.margin.copy()
+    margin[100] = -0.0012
+    assert verdict(robot, replace(walk, margin=margin), perfect) == (
+        "planned ZMP leaves the support polygon by 1.2 mm",
+    )
+
+
+def test_unknown_engines_and_foreign_trajectories_are_refused(robot: Robot, walk: Trajectory) -> None:
+    with pytest.raises(UnknownNameError, match=r"unknown engine 'gazebo'; valid: pybullet, kinematic"):
+        validate(robot, walk, engine="gazebo")  # type: ignore[arg-type]
+    names = ("head", *walk.joint_names[1:])
+    with pytest.raises(InputError, match=r"the trajectory moves the joints head, .*robot bioloid"):
+        validate(robot, replace(walk, joint_names=names), engine="kinematic")
+    one = replace(walk, feet=("right_foot",), contact=walk.contact[:, :1])
+    with pytest.raises(InputError, match="no contact of left_foot"):
+        validate(robot, one, engine="kinematic")
