@@ -140,7 +140,7 @@ def _label_spikes(axes: Axes, spikes: Sequence[Spike], time: Array, value: Array
                 va="bottom" if up else "top",
                 fontsize=6.5,
                 color=ZMP,
-                rotation=90 if len(spikes) > 12 else 0,
+                rotation=90,
             )
     low, high = min(0.0, float(value.min())), max(0.0, float(value.max()))
     room = 0.32 * (high - low or 1.0)

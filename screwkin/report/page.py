@@ -20,6 +20,13 @@ from screwkin.report.facts import Facts, facts_of
 from screwkin.report.numbers import validation_numbers, walk_numbers
 from screwkin.report.pictures import Saved
 
+_UNITS = dict.fromkeys(("stride", "side", "lift", "waist_height", "hand_drop", "spread"), "m") | {
+    "Tc": "s per step",
+    "turn": "rad",
+    "sway": "factor",
+    "ramp": "steps",
+    "rate": "Hz",
+}
 _KIND = {".png": "image/png", ".gif": "image/gif"}
 
 
@@ -45,8 +52,9 @@ def write_page(
         OutputError: the file cannot be written.
     """
     template = Template(files("screwkin.report").joinpath("page.html").read_text(encoding="utf-8"))
+    text = template.substitute(_parts(account, pictures, check, film, commands))
     with atomic_write(path) as file:
-        file.write(template.substitute(_parts(account, pictures, check, film, commands)))
+        file.write(text)
     return path
 
 
@@ -61,7 +69,6 @@ def _parts(
     name = str(gait.get("name", "unknown"))
     steps = "" if account.steps is None else f", {account.steps} steps"
     tone, verdict, remarks = _verdict(account, check)
-    numbers = walk_numbers(account) + (validation_numbers(check) if check else [])
     told = commands or [str(account.trajectory.meta.get("command", "")) or "(not recorded)"]
     return {
         "title": escape(f"{robot.name}: gait {name}{steps}"),
@@ -70,24 +77,24 @@ def _parts(
         "verdict": escape(verdict),
         "remarks": _list(remarks),
         "film": f'<img class="film" alt="The walk in simulation" src="{_embedded(film)}">' if film else "",
-        "numbers": _table(numbers, classes=("", "value", "soft")),
+        "numbers": _numbers(account, check),
         "pictures": _pictures(pictures),
         "robot": escape(f"{robot.name}: {robot.description}. Mass {float(robot.mass):.4f} kg."),
         "mechanism": _mechanism(facts_of(robot)),
         "joints": str(len(robot.joints)),
         "screws": _screws(robot),
         "gait": escape(f"{name}: {gait.get('description', '')}"),
-        "parameters": _parameters(gait),
+        "parameters": _parameters(account),
         "command": escape("\n".join(told)),
         "versions": _made_with(account),
     }
 
 
-def _gait(account: Account) -> dict[str, Any]:
-    """The table ``[gait]`` of the gait that made the trajectory."""
+def _gait(account: Account, table: str = "gait") -> dict[str, Any]:
+    """A table of the gait that made the trajectory; empty where it is not recorded."""
     gait = account.trajectory.meta.get("gait")
-    table = gait.get("gait", gait) if isinstance(gait, dict) else {}
-    return table if isinstance(table, dict) else {}
+    found = gait.get(table) if isinstance(gait, dict) else None
+    return found if isinstance(found, dict) else {}
 
 
 def _verdict(account: Account, check: Validation | None) -> tuple[str, str, list[str]]:
@@ -109,6 +116,12 @@ def _verdict(account: Account, check: Validation | None) -> tuple[str, str, list
         "Balanced on paper: the ZMP stays inside the support polygon. Not simulated yet (screwkin validate).",
         warnings,
     )
+
+
+def _numbers(account: Account, check: Validation | None) -> str:
+    classes = ("", "value", "soft")
+    plan = _table(walk_numbers(account), ("The plan", "", ""), classes)
+    return plan + (_table(validation_numbers(check), ("The simulation", "", ""), classes) if check else "")
 
 
 def _pictures(pictures: Sequence[Saved]) -> str:
@@ -171,16 +184,16 @@ def _screws(robot: Robot) -> str:
     return _table(rows, ("joint", "type", "s", "s0", "limits"), ("", "", "number", "number", "number"))
 
 
-def _parameters(gait: dict[str, Any]) -> str:
-    skipped = ("name", "description", "source")
-    return _table(
-        [
-            (key, f"{value:g}" if isinstance(value, float) else str(value))
-            for key, value in gait.items()
-            if key not in skipped
-        ],
-        classes=("", "value"),
-    )
+def _parameters(account: Account) -> str:
+    """The gait's parameters, then those of its own file."""
+    told = ("name", "description", "source")
+    values = {**_gait(account), **_gait(account, "parameters")}
+    rows = [
+        (key, f"{value:g}" if isinstance(value, float) else str(value), _UNITS.get(key, ""))
+        for key, value in values.items()
+        if key not in told
+    ]
+    return _table(rows, classes=("", "value", "soft"))
 
 
 def _made_with(account: Account) -> str:

@@ -1,0 +1,166 @@
+"""Pictures: every one is drawn and holds what it says; nothing global is left behind."""
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from PIL import Image
+
+from screwkin.report import balance, frames, motion, simulation
+from screwkin.report.pictures import save_pictures
+from screwkin.report.style import save_figure, spans, styled
+
+
+@pytest.fixture(scope="module")
+def saved(account, check, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("pictures")
+    shares = []
+    return save_pictures(account, folder, check, shares.append), shares
+
+
+def test_all_of_the_papers_figures_and_the_simulation_are_drawn(saved):
+    names = {picture.path.stem for picture in saved[0]}
+    paper = {"feet_x", "feet_z", "waist_x", "waist_y", "frames", "zmp_x", "zmp_y", "joints"}
+    assert paper | {"top_view", "margin", "singular_values", "servos", "upright"} <= names
+
+
+def test_every_picture_is_a_png_with_something_in_it(saved):
+    for picture in saved[0]:
+        with Image.open(picture.path) as image:
+            assert image.format == "PNG"
+            assert image.width == 1092
+            grey = np.asarray(image.convert("L"))
+        assert 0.01 < (grey < 250).mean() < 0.9, picture.path.name
+        assert picture.caption.endswith(".")
+
+
+def test_progress_rises_to_one(saved):
+    shares = saved[1]
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0
+
+
+def test_drawing_changes_nothing_global(account, tmp_path):
+    before = dict(mpl.rcParams)
+    with styled():
+        save_figure(motion.feet_along_z(account), tmp_path / "z.png")
+        assert mpl.rcParams["axes.spines.top"] is False
+    assert dict(mpl.rcParams) == before
+
+
+def test_the_same_data_make_the_same_bytes(account, tmp_path):
+    for name in ("a", "b"):
+        with styled():
+            save_figure(motion.waist_along_y(account), tmp_path / f"{name}.png")
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+
+
+def lines(axes):
+    """Lines of an axis by their label."""
+    return {line.get_label(): line for line in axes.get_lines() if not line.get_label().startswith("_")}
+
+
+def test_the_feet_are_drawn_where_they_are(account):
+    trajectory = account.trajectory
+    with styled():
+        drawn = lines(motion.feet_along_z(account).axes[0])
+    for foot in trajectory.feet:
+        line = drawn[foot.replace("_", " ")]
+        assert np.allclose(line.get_ydata(), 1e3 * trajectory.T_world_tip[foot][:, 2, 3])
+        assert np.allclose(line.get_xdata(), trajectory.time)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_zmp_and_gcom_are_drawn_in_the_unit_of_the_axis(account, axis):
+    with styled():
+        place, apart = balance.zmp_against_gcom(account, axis).axes
+    unit = 1e3 if "[mm]" in place.get_ylabel() else 1.0
+    drawn = lines(place)
+    assert np.allclose(drawn["ZMP"].get_ydata(), unit * account.balance.zmp[:, axis])
+    assert np.allclose(drawn["GCoM"].get_ydata(), unit * account.balance.com[:, axis])
+    difference = lines(apart)["ZMP - GCoM"].get_ydata()
+    assert np.allclose(difference, 1e3 * (account.balance.zmp - account.balance.com[:, :2])[:, axis])
+
+
+def test_spikes_are_annotated_with_their_times(account):
+    with styled():
+        axes = balance.margin_over_time(account).axes[1]
+    told = {text.get_text() for text in axes.texts}
+    largest = max(account.balance.spikes, key=lambda spike: spike.distance)
+    assert f"{largest.time:.2f}" in told
+    assert told <= {f"{spike.time:.2f}" for spike in account.balance.spikes}
+
+
+def test_support_polygons_hold_the_zmp_of_a_sound_walk(account):
+    from shapely.geometry import Point, Polygon
+
+    phases = balance.support_polygons(account)
+    assert phases[0][0] == 0
+    assert phases[-1][1] == account.trajectory.samples - 1
+    for begin, end, corners in phases:
+        polygon = Polygon(corners)
+        for i in range(begin, end + 1):
+            point = Point(*account.balance.zmp[i])
+            assert polygon.exterior.distance(point) == pytest.approx(account.balance.margin[i], abs=1e-9)
+            assert polygon.contains(point)
+
+
+def test_a_zmp_outside_is_marked(tipping):
+    with styled():
+        drawn = lines(balance.seen_from_above(tipping).axes[0])
+    assert len(drawn["ZMP outside"].get_xdata()) == tipping.outside.sum() > 0
+
+
+def test_swings_are_shaded_while_the_foot_is_in_the_air(account):
+    with styled():
+        figure = motion.feet_along_z(account)
+    shaded = [p for p in figure.axes[0].patches if p.get_label() == "right foot in the air"]
+    contact = account.trajectory.contact[:, account.trajectory.feet.index("right_foot")]
+    first = account.trajectory.time[np.flatnonzero(~contact)[0]]
+    assert shaded[0].get_x() == pytest.approx(first)
+
+
+def test_joint_angles_are_in_degrees_and_named_without_the_side(account, robot):
+    with styled():
+        right, left = (lines(axes) for axes in motion.joint_angles(account).axes)
+    knee = robot.joint_names.index("left_knee")
+    assert np.allclose(left["knee"].get_ydata(), np.degrees(account.trajectory.q[:, knee]))
+    assert set(right) == set(left) == {
+        "hip yaw", "hip roll", "hip pitch", "knee", "ankle pitch", "ankle roll"
+    }  # fmt: skip
+
+
+def test_a_robot_without_arms_has_no_picture_of_them(account, robot):
+    from dataclasses import replace
+
+    legs = tuple(limb for limb in robot.limbs if limb.kind == "leg")
+    assert motion.joint_angles(replace(account, robot=replace(robot, limbs=legs)), "arm") is None
+
+
+def test_frames_are_taken_over_one_cycle_in_the_middle(account):
+    times = frames.frame_times(account)
+    begin, end = account.boundaries[2], account.boundaries[4]
+    assert times[0] == pytest.approx(begin)
+    assert np.allclose(np.diff(times), (end - begin) / 6)
+
+
+def test_a_link_without_boxes_is_drawn_as_a_line_to_what_it_carries(account, robot):
+    from dataclasses import replace
+
+    bare = replace(robot, links=tuple(replace(link, boxes=()) for link in robot.links))
+    with styled():
+        figure = frames.frames_drawn(replace(account, robot=bare))
+    drawn = [line for line in figure.axes[0].get_lines() if len(line.get_xdata()) == 2]
+    thigh = 0.0773829
+    lengths = [np.hypot(*np.ptp(line.get_xydata(), axis=0)) for line in drawn]
+    assert max(lengths[1:]) <= thigh + 0.02
+    assert len(drawn) > 8
+
+
+def test_where_nothing_was_measured_nothing_is_drawn(account, check):
+    assert simulation.contact_zmp(account, check) is None
+
+
+def test_spans_are_runs_of_true():
+    assert spans([False, True, True, False, True]) == [(1, 3), (4, 4)]
+    assert spans([True, True]) == [(0, 1)]
+    assert spans([False]) == []
