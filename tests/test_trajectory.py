@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
+from scipy.spatial.transform import Rotation, Slerp
 
 from screwkin.errors import OutputError, TrajectoryError
 from screwkin.trajectory import Trajectory, load_trajectory, sha256_of
@@ -146,6 +147,20 @@ def test_beyond_its_ends_the_motion_rests() -> None:
     q, qd = walk.sampled(np.array([-1.0, 9.0]))
     assert np.allclose(q, walk.q[[0, -1]], rtol=0, atol=1e-14)
     assert np.array_equal(qd, np.zeros((2, 3)))
+
+
+def test_between_samples_the_base_turns_evenly_and_its_origin_moves_on_the_spline() -> None:
+    fields = fields_of_a_walk()
+    turns = Rotation.from_rotvec(np.random.default_rng(2).normal(size=(SAMPLES, 3)))
+    fields["T_world_base"][:, :3, :3] = turns.as_matrix()
+    walk = Trajectory(**fields)
+    times = np.linspace(-0.01, 0.13, 40)
+    inside = np.clip(times, 0.0, 0.12)
+    T = walk.base_sampled(times)
+    origin = CubicHermiteSpline(walk.time, walk.T_world_base[:, :3, 3], walk.base_twist[:, 3:])
+    assert np.allclose(T[:, :3, 3], origin(inside), rtol=0, atol=1e-13)
+    assert np.allclose(T[:, :3, :3], Slerp(walk.time, turns)(inside).as_matrix(), rtol=0, atol=1e-13)
+    assert np.array_equal(T[:, 3], np.tile([0.0, 0.0, 0.0, 1.0], (40, 1)))
 
 
 def test_a_truncated_file_is_refused_wherever_it_ends(tmp_path: Path) -> None:

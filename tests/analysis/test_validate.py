@@ -198,3 +198,25 @@ def test_unknown_engines_and_foreign_trajectories_are_refused(robot: Robot, walk
     one = replace(walk, feet=("right_foot",), contact=walk.contact[:, :1])
     with pytest.raises(InputError, match="no contact of left_foot"):
         validate(robot, one, engine="kinematic")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("Tc", [0.8, 1.0, 1.5, 2.0])
+def test_eight_steps_pass_at_every_pace(robot: Robot, Tc: float) -> None:
+    check = validate(robot, planned(robot, steps=8, Tc=Tc))
+    assert check.passed
+    assert check.end_error_mm < 2.0
+    assert check.zmp_rms_mm is not None
+    assert check.zmp_max_mm is not None
+    assert check.zmp_rms_mm <= 1.0
+    assert check.zmp_max_mm <= 5.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("gait", "settings"), [("walk", {"Tc": 0.5}), ("paper", {"Tc": 0.5}), ("walk", {"sway": 0.0})]
+)
+def test_what_cannot_balance_falls(robot: Robot, gait: str, settings: dict[str, float]) -> None:
+    check = validate(robot, sk.walk(robot, sk.load_gait(gait).replace(**settings), steps=8))
+    assert check.fell
+    assert not check.passed
