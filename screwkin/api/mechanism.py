@@ -15,10 +15,12 @@ from screwkin.mechanism import virtual_motion as virtual
 from screwkin.mechanism.mechanism import Mechanism
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
+from screwkin.scalar import is_jax
 from screwkin.se3 import ZERO, Twist, as_array, vector_from_array
 from screwkin.solve import pose as pose_solver
 from screwkin.solve import rates
 from screwkin.solve.pose import PoseSolution
+from screwkin.solve.singularity import singularity_report
 from screwkin.solve.status import Status
 
 
@@ -94,25 +96,36 @@ def secondary_rates(
             marking samples solved by least squares. Traced JAX arrays cannot raise: use ``"status"`` there.
 
     Raises:
-        SingularError: a limb is singular; names limb and sample.
+        SingularError: a limb is singular; names limb, sample and cause.
 
     Source: paper A, eq. 10-11.
     """
     primary = checked("primary_rates", primary_rates, len(mechanism.primary))
-    solution = rates.secondary_rates(mechanism, network_matrix(mechanism, state), primary)
+    N = network_matrix(mechanism, state)
+    solution = rates.secondary_rates(mechanism, N, primary)
     singular = solution.singular
     if on_singular == "status":
-        return solution.values, singular.any(axis=-1) * int(Status.SINGULAR)
+        return solution.values, _status(singular.any(axis=-1), solution.values.shape[:-1])
     if on_singular != "raise":
         raise InputError(f"on_singular is {on_singular!r}; valid: raise, status")
     if singular.any():
-        sample, block = (int(i) for i in np.argwhere(np.reshape(singular, (-1, singular.shape[-1])))[0])
-        raise SingularError(
-            f"{solution.blocks[block]}, sample {sample}: singular; {Status.SINGULAR.help}",
-            solution.blocks[block],
-            sample,
-        )
+        flat = np.reshape(singular, (-1, singular.shape[-1]))
+        sample, block = (int(i) for i in np.argwhere(flat)[0])
+        here = np.reshape(np.asarray(N), (-1, *N.shape[-2:]))[sample]
+        limb, cause = solution.blocks[block], singularity_report(mechanism, here)[block].cause
+        message = f"{limb}, sample {sample}: singular; {cause}; {Status.SINGULAR.help}"
+        raise SingularError(message, limb, sample)
     return solution.values
+
+
+def _status(singular: Array, batch: tuple[int, ...]) -> Array:
+    """Status (...,) of every sample, also where only the motion has a batch."""
+    if is_jax(singular):
+        import jax.numpy as jnp
+
+        status = jnp.where(singular, int(Status.SINGULAR), int(Status.CONVERGED))
+        return jnp.broadcast_to(status, batch)
+    return np.broadcast_to(np.where(singular, Status.SINGULAR, Status.CONVERGED), batch).astype(int)
 
 
 def solve_pose(

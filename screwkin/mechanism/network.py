@@ -63,8 +63,9 @@ def network_matrix(
     ``circuits`` (k, couplings) is another choice of circuits than the mechanism's own.
     """
     S = as_array(list(twists), batch)
-    B = mechanism.circuit_matrix if circuits is None else circuits
-    N = B[:, None, :] * S.swapaxes(-1, -2)[..., None, :, :]
+    B = (mechanism.circuit_matrix if circuits is None else circuits).astype(float)
+    signs = B.reshape(*(1 for _ in S.shape[:-2]), len(B), 1, -1)
+    N = signs * S.swapaxes(-1, -2)[..., None, :, :]
     return N.reshape(*S.shape[:-2], -1, len(mechanism.couplings))
 
 

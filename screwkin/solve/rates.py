@@ -61,24 +61,23 @@ def solve_secondary(mechanism: Mechanism, N: Array, right: Array) -> SecondarySo
     np_ = _numpy_of(N, right)
     length = characteristic_length(mechanism.robot)
     columns = mechanism.secondary_columns
+    scaled, wanted = normalised(N, length), normalised(right[..., None], length)
     parts: list[tuple[int, Array]] = []
     sigmas = []
     for circuits, inside in mechanism.blocks:
         rows = block_rows(circuits)
-        scale = np.tile([1.0, 1.0, 1.0, 1 / length, 1 / length, 1 / length], len(circuits))
-        A = N[..., rows, :][..., [columns[i] for i in inside]] * scale[:, None]
-        b = right[..., rows] * scale
+        A = scaled[..., rows, :][..., [columns[i] for i in inside]]
+        b = wanted[..., rows, :]
         sigma = np_.linalg.svd(A, compute_uv=False)[..., -1]
-        square = A.shape[-1] == A.shape[-2]
-        if square:
-            eye = np_.eye(A.shape[-1])
+        if A.shape[-1] == A.shape[-2]:
             healthy = (sigma >= RANK_TOLERANCE)[..., None, None]
-            x = np_.linalg.solve(np_.where(healthy, A, eye), b[..., None])[..., 0]
+            eye = np_.broadcast_to(np_.eye(A.shape[-1]), A.shape)
+            x = np_.linalg.solve(np_.where(healthy, A, eye), b)[..., 0]
             if not is_jax(A) and not healthy.all():
-                least = (np.linalg.pinv(A, rcond=RANK_TOLERANCE) @ b[..., None])[..., 0]
+                least = (np.linalg.pinv(A, rcond=RANK_TOLERANCE) @ b)[..., 0]
                 x = np.where(healthy[..., 0], x, least)
         else:
-            x = (np_.linalg.pinv(A, rcond=RANK_TOLERANCE) @ b[..., None])[..., 0]
+            x = (np_.linalg.pinv(A, rcond=RANK_TOLERANCE) @ b)[..., 0]
         parts += [(i, x[..., k]) for k, i in enumerate(inside)]
         sigmas.append(sigma)
     names = tuple(block_name(mechanism, circuits) for circuits, _ in mechanism.blocks)
