@@ -98,12 +98,15 @@ def test_a_film_is_embedded_too(account, tmp_path):
 
 
 def test_markup_in_names_is_text(account, robot, tmp_path):
-    sly = replace(account, robot=replace(robot, name="<b>x", description="a & $title"))
+    meta = {**account.trajectory.meta, "gait": {"gait": {"name": "paper", "Tc": "<u>1"}}}
+    walked = replace(account.trajectory, meta=meta)
+    sly = replace(account, robot=replace(robot, name="<b>x", description="a & $title"), trajectory=walked)
     caption = Saved(tmp_path / "p.png", "<i>", '"><script>')
     (tmp_path / "p.png").write_bytes(b"")
     read = page(tmp_path / "report.html", sly, [caption], commands=["screwkin walk '<x>'"])
     assert "<b>x: gait paper" in read.words
     assert "a & $title" in read.words
+    assert "<u>1 s per step" in read.words
     assert "screwkin walk '<x>'" in read.words
 
 

@@ -81,6 +81,19 @@ def test_zmp_and_gcom_are_drawn_in_the_unit_of_the_axis(account, axis):
     assert np.allclose(difference, 1e3 * (account.balance.zmp - account.balance.com[:, :2])[:, axis])
 
 
+def test_the_band_is_the_extent_of_the_soles_on_the_floor(account):
+    with styled():
+        place = balance.zmp_against_gcom(account, 1).axes[0]
+    band = next(c for c in place.collections if c.get_label() == "support polygon").get_paths()[0].vertices
+    trajectory, half = account.trajectory, 33.0  # mm: half of a sole's width
+    for i in (0, 60, 100, 150, trajectory.samples - 2):
+        feet = [f for k, f in enumerate(trajectory.feet) if trajectory.contact[i, k]]
+        edges = [1e3 * trajectory.T_world_tip[f][i, 1, 3] + s * half for f in feet for s in (-1, 1)]
+        here = band[np.abs(band[:, 0] - trajectory.time[i]) < 1e-9, 1]
+        assert min(here) == pytest.approx(min(edges), abs=1e-6)
+        assert max(here) == pytest.approx(max(edges), abs=1e-6)
+
+
 def test_spikes_are_annotated_with_their_times(account):
     with styled():
         axes = balance.margin_over_time(account).axes[1]
@@ -94,8 +107,8 @@ def test_support_polygons_hold_the_zmp_of_a_sound_walk(account):
     from shapely.geometry import Point, Polygon
 
     phases = balance.support_polygons(account)
-    assert phases[0][0] == 0
-    assert phases[-1][1] == account.trajectory.samples - 1
+    covered = [i for begin, end, _ in phases for i in range(begin, end + 1)]
+    assert covered == list(range(account.trajectory.samples))
     for begin, end, corners in phases:
         polygon = Polygon(corners)
         for i in range(begin, end + 1):
@@ -137,10 +150,31 @@ def test_a_robot_without_arms_has_no_picture_of_them(account, robot):
 
 
 def test_frames_are_taken_over_one_cycle_in_the_middle(account):
+    from dataclasses import replace
+
     times = frames.frame_times(account)
     begin, end = account.boundaries[2], account.boundaries[4]
     assert times[0] == pytest.approx(begin)
     assert np.allclose(np.diff(times), (end - begin) / 6)
+    for boundaries, start in (
+        ([0, 1, 2, 3, 4, 5, 6], 2.0),
+        ([0, 1, 2], 0.0),
+    ):  # a cycle begins at an even step
+        meta = {**account.trajectory.meta, "boundaries": boundaries}
+        other = replace(account, trajectory=replace(account.trajectory, meta=meta))
+        assert frames.frame_times(other)[0] == start
+
+
+def test_what_is_near_the_viewer_hides_what_is_far(account):
+    with styled():
+        patches = frames.frames_drawn(account).axes[0].patches
+    from matplotlib.colors import to_hex
+
+    from screwkin.report.style import SIDES
+
+    colours = [to_hex(patch.get_facecolor()).upper() for patch in patches]
+    right, left = ([k for k, colour in enumerate(colours) if colour == side] for side in SIDES[:2])
+    assert max(left) < min(right)  # the viewer stands at the robot's right
 
 
 def test_a_link_without_boxes_is_drawn_as_a_line_to_what_it_carries(account, robot):
