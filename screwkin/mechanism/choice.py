@@ -33,7 +33,7 @@ def characteristic_length(robot: Robot) -> float:
 def normalised(N: Array, length: float) -> Array:
     """N with its velocity rows divided by a length: all entries of order one, without unit."""
     scale = np.tile([1.0, 1.0, 1.0, 1.0 / length, 1.0 / length, 1.0 / length], N.shape[-2] // 6)
-    return N * scale.reshape(*(1 for _ in N.shape[:-2]), -1, 1)
+    return N * scale.reshape(*(1 for _ in N.shape[:-2]), len(scale), 1)
 
 
 def rank(N: Array) -> int:

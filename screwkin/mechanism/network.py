@@ -64,7 +64,7 @@ def network_matrix(
     """
     S = as_array(list(twists), batch)
     B = (mechanism.circuit_matrix if circuits is None else circuits).astype(float)
-    signs = B.reshape(*(1 for _ in S.shape[:-2]), len(B), 1, -1)
+    signs = B.reshape(*(1 for _ in S.shape[:-2]), len(B), 1, B.shape[1])
     N = signs * S.swapaxes(-1, -2)[..., None, :, :]
     return N.reshape(*S.shape[:-2], -1, len(mechanism.couplings))
 

@@ -10,6 +10,7 @@ from screwkin.errors import InputError, ShapeError
 from screwkin.model.table import load_robot
 from screwkin.solve.rates import block_name, secondary_rates, singular_values
 from screwkin.solve.status import Status
+from tests.kinematics.machines import planar_arm, spherical_wrist
 
 
 @pytest.fixture(scope="module")
@@ -121,35 +122,45 @@ def test_singular_values_are_those_of_the_solution(bioloid, mechanism):
     )
 
 
-@pytest.mark.parametrize("name", ["bioloid", "linkages/four-bar", "linkages/bennett"])
-def test_under_jax_the_rates_are_the_same_and_have_derivatives(x64, name):
+@pytest.mark.parametrize("robot", [planar_arm(), spherical_wrist()], ids=["arm", "wrist"])
+def test_under_jax_the_rates_are_the_same_and_have_derivatives(x64, robot):
     import jax
     import jax.numpy as jnp
 
-    robot = load_robot(name)
-    mechanism = sk.closed_mechanism(robot)
-    home = sk.home(robot)
-    primary = np.linspace(0.1, 0.4, len(mechanism.primary))
+    mechanism, home = sk.closed_mechanism(robot), sk.home(robot)
+    primary, step = np.linspace(0.1, 0.4, 3), np.array([0.3, -0.2, 0.5])
 
     def rates(q):
-        found, status = sk.secondary_rates(
-            mechanism, sk.State(jnp.asarray(home.T_world_base), q), jnp.asarray(primary), on_singular="status"
-        )
-        return found, status
+        state = sk.State(jnp.asarray(home.T_world_base), q)
+        return sk.secondary_rates(mechanism, state, jnp.asarray(primary), on_singular="status")
 
-    found, status = jax.jit(rates)(jnp.asarray(home.q))
+    def along(q, dq):
+        return jax.jvp(lambda x: rates(x)[0], (q,), (dq,))[1], rates(q)
+
+    slope, (found, status) = jax.jit(along)(jnp.asarray(home.q), jnp.asarray(step))
     assert int(status) == Status.CONVERGED
     np.testing.assert_allclose(found, sk.secondary_rates(mechanism, home, primary), atol=1e-12)
-    if robot.closures:
-        return  # off its closed positions a linkage has no rates to differentiate
-    slope = jax.jacfwd(lambda q: rates(q)[0])(jnp.asarray(home.q))
-    step = np.zeros(len(home.q))
-    step[3] = 1e-6
     ends = [
-        sk.secondary_rates(mechanism, sk.State(home.T_world_base, home.q + sign * step), primary)
-        for sign in (1, -1)
+        sk.secondary_rates(mechanism, sk.State(home.T_world_base, home.q + h * step), primary)
+        for h in (1e-6, -1e-6)
     ]
-    np.testing.assert_allclose(slope[:, 3], (ends[0] - ends[1]) / 2e-6, atol=1e-6)
+    np.testing.assert_allclose(slope, (ends[0] - ends[1]) / 2e-6, atol=1e-7)
+
+
+def test_an_overconstrained_loop_has_the_same_rates_under_jax(x64):
+    """Three secondary joints, six equations: a pseudo-inverse, batched under strict promotion."""
+    import jax
+    import jax.numpy as jnp
+
+    mechanism = sk.closed_mechanism(load_robot("linkages/four-bar"))
+    home = sk.home(mechanism.robot)
+    batch = sk.State(jnp.asarray(np.tile(home.T_world_base, (2, 1, 1))), jnp.asarray(np.tile(home.q, (2, 1))))
+    primary = jnp.asarray([[0.5], [1.5]])
+    found, status = jax.jit(lambda s: sk.secondary_rates(mechanism, sk.State(*s), primary, "status"))(
+        (batch.T_world_base, batch.q)
+    )
+    np.testing.assert_array_equal(status, [0, 0])
+    np.testing.assert_allclose(found, sk.secondary_rates(mechanism, home, np.array(primary)), atol=1e-12)
 
 
 def test_wrong_shapes_and_words_are_refused(bioloid, mechanism):
