@@ -1,0 +1,227 @@
+"""The screw model of a robot against its Denavit-Hartenberg model: the same motion, at which price.
+
+Both models are run on the same joint positions in the same call; nothing is taken from the literature.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from screwkin.analysis.chains import Chain, by_dh, by_screws, by_steps, chains_of, support_models
+from screwkin.analysis.misalignment import Misalignment, misalignment, sensitivity
+from screwkin.analysis.operations import operations
+from screwkin.errors import InputError
+from screwkin.mechanism.choice import characteristic_length
+from screwkin.model.dh import DHTable, dh_fk
+from screwkin.model.robot import Robot
+from screwkin.screw import at
+from screwkin.se3 import Pose, as_array, leaves, pose_from_array, rotation_log
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+BATCH = 200
+"""Joint positions per evaluation when times are measured: small enough for memory to play no part."""
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Screws against DH.
+
+    Attributes:
+        robot: name of the robot.
+        chains: the compared chains, with their tables.
+        samples: random joint positions compared.
+        fk_max_abs: largest difference of an entry of a tip's pose, all supporting feet included [1 and m].
+        jacobian_max_abs: largest difference of an entry of a chain's Jacobian at the base origin.
+        dh_models: sets of DH tables that a walk needs with the standing foot as base: one per leg.
+        screw_models: sets of screws that it needs.
+        dh_jacobians: separate Jacobians: base in the world (if it floats), and each chain.
+        screw_jacobians: the one network matrix of the closed mechanism.
+        parameters: numbers that the tables hold (see ``_parameters``).
+        operations: arithmetic operations by way of computing (see ``operations.operations``).
+        seconds: time of all tips and Jacobians for 200 positions, by way: the fastest of rounds in turn.
+        speed_ratio: time by DH over time by screws; above 1 screws are faster.
+        speed_ratio_by_steps: the same for screws carried from axis point to axis point.
+        sensitivity: change of a model's numbers per change of its axes.
+        jacobian_condition: of each chain at home, with velocities divided by the robot's size.
+        misalignment: what a tilt of parallel axes does; None without parallel axes.
+    """
+
+    robot: str
+    chains: tuple[Chain, ...]
+    samples: int
+    fk_max_abs: float
+    jacobian_max_abs: float
+    dh_models: int
+    screw_models: int
+    dh_jacobians: int
+    screw_jacobians: int
+    parameters: Mapping[str, int]
+    operations: Mapping[str, Mapping[str, int]]
+    seconds: Mapping[str, float]
+    speed_ratio: float
+    speed_ratio_by_steps: float
+    sensitivity: Mapping[str, float]
+    jacobian_condition: Mapping[str, float]
+    misalignment: Misalignment | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything as JSON data; every chain with its DH rows."""
+        plain = {name: value for name, value in vars(self).items() if name not in ("chains", "misalignment")}
+        tables = {
+            chain.name: {
+                "convention": chain.table.convention,
+                "printed": chain.printed,
+                "rows": [asdict(row) for row in chain.table.rows],
+            }
+            for chain in self.chains
+        }
+        series = None if self.misalignment is None else dict(vars(self.misalignment))
+        return {**plain, "tables": tables, "misalignment": series}
+
+
+def compare_models(robot: Robot, samples: int = 1000, rounds: int = 21, seed: int = 0) -> Comparison:
+    """Compare the screw model of a robot with its DH model.
+
+    Args:
+        robot: the robot; without limbs, the chains to its outermost links are compared.
+        samples: random joint positions, within the limits where there are any.
+        rounds: alternating time measurements.
+        seed: of the random numbers.
+
+    Raises:
+        InputError: samples or rounds below 1; no joints; a helical joint, which DH tables cannot hold.
+    """
+    if samples < 1 or rounds < 1:
+        raise InputError(f"samples {samples} and rounds {rounds} must be at least 1")
+    chains = chains_of(robot)
+    models = support_models(robot, chains)
+    rng, length = np.random.default_rng(seed), characteristic_length(robot)
+    q = random_positions(robot, samples, rng)
+    fk, jacobian = differences(chains, models, q)
+    times = _times(chains, random_positions(robot, BATCH, rng), rounds)
+    return Comparison(
+        robot=robot.name,
+        chains=chains,
+        samples=samples,
+        fk_max_abs=fk,
+        jacobian_max_abs=jacobian,
+        dh_models=max(1, len(models)),
+        screw_models=1,
+        dh_jacobians=len(chains) + (robot.base == "floating"),
+        screw_jacobians=1,
+        parameters=_parameters(chains, max(1, len(models))),
+        operations=operations(chains),
+        seconds=times,
+        speed_ratio=times["dh"] / times["screw"],
+        speed_ratio_by_steps=times["dh"] / times["screw_by_steps"],
+        sensitivity=sensitivity(chains, length, seed=seed),
+        jacobian_condition=_conditions(robot, chains, length),
+        misalignment=misalignment(chains, seed=seed),
+    )
+
+
+def random_positions(robot: Robot, count: int, rng: np.random.Generator) -> Array:
+    """Joint positions (count, n) within the limits, and within half a turn or half a metre."""
+    span = [0.5 if joint.type == "prismatic" else math.pi for joint in robot.joints]
+    lower = [max(joint.lower, -s) for joint, s in zip(robot.joints, span, strict=True)]
+    upper = [min(joint.upper, s) for joint, s in zip(robot.joints, span, strict=True)]
+    return rng.uniform(lower, np.maximum(lower, upper), (count, len(robot.joints)))
+
+
+def _of(chain: Chain, q: Array) -> list[Array]:
+    """The positions of a chain's joints, batch by joint."""
+    return [q[..., i] for i in chain.joints]
+
+
+def differences(
+    chains: Sequence[Chain], models: Mapping[str, Sequence[DHTable]], q: Array
+) -> tuple[float, float]:
+    """Largest difference of tip poses and of Jacobians between the models."""
+    fk, jacobian, tips = 0.0, 0.0, dict[str, Pose]()
+    for chain in chains:
+        tip, columns = by_screws(chain.screws, chain.frame, _of(chain, q))
+        other_tip, other_columns = by_dh(chain.table, _of(chain, q))
+        fk = max(fk, _apart(tip, other_tip))
+        jacobian = max(jacobian, *(_apart(a, b) for a, b in zip(columns, other_columns, strict=True)))
+        tips[chain.name] = tip
+    by_name = {chain.name: chain for chain in chains}
+    for standing, (upwards, *others) in models.items():
+        base = dh_fk(upwards, _of(by_name[standing], q)[::-1])
+        fk = max(fk, _apart(tips[standing].inverse, base))
+        for table in others:
+            reached = base @ dh_fk(table, _of(by_name[table.name], q))
+            fk = max(fk, _apart(tips[standing].inverse @ tips[table.name], reached))
+    return fk, jacobian
+
+
+def _apart(a: Any, b: Any) -> float:
+    return float(np.abs(as_array(a) - as_array(b)).max())
+
+
+def _times(chains: Sequence[Chain], q: Array, rounds: int) -> dict[str, float]:
+    """Seconds of the fastest evaluation of all chains, the ways taking turns."""
+    positions = [_of(chain, q) for chain in chains]
+    ways: dict[str, Callable[[Chain, Sequence[Array]], object]] = {
+        "dh": lambda chain, q: by_dh(chain.table, q),
+        "screw": lambda chain, q: by_screws(chain.screws, chain.frame, q),
+        "screw_by_steps": lambda chain, q: by_steps(chain.screws, chain.frame, q),
+    }
+    times: dict[str, list[float]] = {way: [] for way in ways}
+    for _ in range(rounds):
+        for way, evaluate in ways.items():
+            begin = time.perf_counter()
+            for chain, values in zip(chains, positions, strict=True):
+                evaluate(chain, values)
+            times[way].append(time.perf_counter() - begin)
+    return {way: min(each) for way, each in times.items()}
+
+
+def _parameters(chains: Sequence[Chain], models: int) -> dict[str, int]:
+    """Numbers in the tables.
+
+    ``dh``: four per joint and six for base and tool of every chain, in every model; ``dh_per_model``;
+    ``screw``: six per joint (s and s0) and six per tip; ``dh_not_zero`` and ``screw_not_zero``: those of one
+    model that are not 0. The least that determine a chain of n revolute joints are 4 n + 6: screws hold two
+    more per joint, the length of s and the place of s0 along it.
+    """
+    rows = [row for chain in chains for row in chain.table.rows]
+    ends = [pose for chain in chains for pose in (chain.table.base, chain.table.tool)]
+    joints = {i: screw for chain in chains for i, screw in zip(chain.joints, chain.screws, strict=True)}
+    per_model = 4 * len(rows) + 6 * len(chains)
+    dh = [x for row in rows for x in (row.alpha, row.a, row.d, row.offset)]
+    dh += [x for pose in ends for x in _six(pose)]
+    screw = [x for one in joints.values() for x in (*one.s, *one.s0)]
+    screw += [x for chain in chains for x in _six(chain.frame)]
+    return {
+        "dh": models * per_model,
+        "dh_per_model": per_model,
+        "screw": 6 * len(joints) + 6 * len(chains),
+        "dh_not_zero": sum(abs(x) > 1e-12 for x in dh),
+        "screw_not_zero": sum(abs(x) > 1e-12 for x in screw),
+    }
+
+
+def _six(pose: Pose) -> list[float]:
+    """Position and rotation vector."""
+    return [float(x) for x in (*pose.p, *leaves(rotation_log(pose_from_array(as_array(pose)).R)))]
+
+
+def _conditions(robot: Robot, chains: Sequence[Chain], length: float) -> dict[str, float]:
+    """Condition number of every chain's Jacobian at the tip, in posture ``home`` or else at zero."""
+    home = next(
+        (posture.q for posture in robot.postures if posture.name == "home"), (0.0,) * len(robot.joints)
+    )
+    found = {}
+    for chain in chains:
+        tip, columns = by_screws(chain.screws, chain.frame, [home[i] for i in chain.joints])
+        J = as_array([at(tip.p, column) for column in columns]).T / np.array([[1]] * 3 + [[length]] * 3)
+        sigma = np.linalg.svd(J, compute_uv=False)
+        found[chain.name] = float(sigma[0] / sigma[-1]) if sigma[-1] > 1e-12 * sigma[0] else math.inf
+    return found
