@@ -95,12 +95,13 @@ class Account:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What works on paper, but not on the servos or not for long."""
-        found = [
-            f"{joint.name} turns at up to {share * joint.velocity:.2f} rad/s; its servo allows "
-            f"{joint.velocity:.2f}"
+        fast = [
+            f"{joint.name} {share * joint.velocity:.1f} of {joint.velocity:.1f} rad/s"
             for joint in self.robot.joints
             if (share := self.speed_use[joint.name]) > 1.0
         ]
+        # In the words of a simulation's own warning, so that a page tells it once.
+        found = [f"planned joint speed above the servo's: {', '.join(fast)}"] if fast else []
         near = [
             f"{limb.limb} comes near a singularity at {self.trajectory.time[limb.sample]:.2f} s: {limb.cause}"
             for limb in self.limbs

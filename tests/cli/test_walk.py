@@ -96,7 +96,7 @@ def test_joints_faster_than_their_servos_are_a_warning(cli):
     warnings = cli("walk", "bioloid", "--steps", 2, "--set", "Tc=0.5", "--no-plots", "--json").data[
         "warnings"
     ]
-    assert any("right_knee turns at up to" in warning and "allows 6.00" in warning for warning in warnings)
+    assert any("speed above the servo's" in warning and "of 6.0 rad/s" in warning for warning in warnings)
 
 
 @pytest.mark.parametrize(

@@ -76,7 +76,7 @@ def test_speeds_are_shares_of_the_servos_limits(robot, trajectory):
     qd[3, knee] = -9.0
     account = account_of(robot, replace(trajectory, qd=qd))
     assert account.speed_use["right_knee"] == pytest.approx(9.0 / 6.0)
-    assert "right_knee turns at up to 9.00 rad/s; its servo allows 6.00" in account.warnings
+    assert "planned joint speed above the servo's: right_knee 9.0 of 6.0 rad/s" in account.warnings
 
 
 def test_a_changed_zmp_is_noticed(robot, trajectory, account):

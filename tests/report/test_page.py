@@ -7,6 +7,7 @@ from html.parser import HTMLParser
 
 import pytest
 
+import screwkin as sk
 from screwkin.errors import OutputError
 from screwkin.report.page import write_page
 from screwkin.report.pictures import Saved, save_pictures
@@ -89,6 +90,15 @@ def test_a_failed_simulation_tells_every_reason(account, check, tmp_path):
     assert all(reason in words for reason in check.reasons)
     passed = page(tmp_path / "report.html", account, [], replace(check, passed=True, reasons=())).words
     assert "Passed: the robot walks in simulation as planned." in passed
+
+
+def test_fast_joints_are_told_once_although_plan_and_simulation_warn(robot, tmp_path):
+    from screwkin.analysis.validate import validate
+    from screwkin.report.account import account_of
+
+    hasty = sk.walk(robot, sk.load_gait("walk").replace(Tc=0.5), steps=1)
+    words = page(tmp_path / "r.html", account_of(robot, hasty), [], validate(robot, hasty, "kinematic")).words
+    assert words.count("planned joint speed above the servo's") == 1
 
 
 def test_a_film_is_embedded_too(account, tmp_path):
