@@ -8,6 +8,7 @@ import numpy as np
 
 from screwkin.api.arrays import Array, checked, joint_scalars, parts, twist_of
 from screwkin.dynamics import newton_euler
+from screwkin.errors import InputError
 from screwkin.kinematics import mass, positions
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
@@ -87,13 +88,23 @@ def _last_axes_swapped(array: Array) -> Array:
 
 
 def center_of_mass(robot: Robot, state: State) -> Array:
-    """World position (..., 3) of the centre of mass [m]."""
+    """World position (..., 3) of the centre of mass [m].
+
+    Raises:
+        InputError: no link has a mass.
+    """
+    _check_mass(robot)
     T, q, batch = parts(robot, state)
     return as_array(T @ mass.center_of_mass(robot, positions.link_displacements(robot, q)), batch)
 
 
 def com_jacobian(robot: Robot, state: State) -> Array:
-    """Velocity of the CoM (..., 3, 6+n), world axes, per [base twist at the base origin; qd]."""
+    """Velocity of the CoM (..., 3, 6+n), world axes, per [base twist at the base origin; qd].
+
+    Raises:
+        InputError: no link has a mass.
+    """
+    _check_mass(robot)
     T, q, batch = parts(robot, state)
     turned = Pose(T.R, ZERO)
     D = [turned @ d for d in positions.link_displacements(robot, q)]
@@ -101,6 +112,11 @@ def com_jacobian(robot: Robot, state: State) -> Array:
     c = mass.center_of_mass(robot, D)
     spin = [at(c, Twist(e, ZERO)).v for e in (X, Y, Z)]
     return _last_axes_swapped(as_array([*spin, X, Y, Z, *mass.com_jacobian(robot, D, twists)], batch))
+
+
+def _check_mass(robot: Robot) -> None:
+    if not robot.mass > 0:
+        raise InputError(f"{robot.name} has no mass: every link of its table has mass 0, so it has no CoM")
 
 
 def _bodies(robot: Robot, state: State) -> tuple[newton_euler.Bodies, tuple[int, ...]]:
@@ -116,7 +132,11 @@ def momentum(robot: Robot, state: State, qd: Any, base_twist: Any = None) -> Arr
         state: its configuration.
         qd: joint rates (..., n).
         base_twist: [omega; v of the base origin] in world axes (..., 6); default at rest.
+
+    Raises:
+        InputError: no link has a mass.
     """
+    _check_mass(robot)
     bodies, batch = _bodies(robot, state)
     h = newton_euler.momentum(bodies, joint_scalars(robot, "qd", qd), twist_of("base_twist", base_twist))
     c = ZERO

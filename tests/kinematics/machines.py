@@ -80,7 +80,9 @@ def random_tree(seed: int, joints: int = 7, branching: bool = True, base: str = 
         rows.append(joint(rng, i, parent, str(rng.choice(TYPES))))
         parents.append(f"link_{i}")
     home = rng.uniform(-0.8, 0.8, joints)
-    return machine([body(rng, name) for name in parents], rows, base, home=home)
+    links = [body(rng, name) for name in parents]
+    links[0] = replace(links[0], frame=IDENTITY)  # it is called base, and so is the base frame
+    return machine(links, rows, base, home=home)
 
 
 def random_state(robot: Robot, seed: int, batch: tuple[int, ...] = ()) -> State:
