@@ -1,0 +1,112 @@
+"""``screwkin compare``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from screwkin.analysis.compare import Comparison, compare_models
+from screwkin.cli.folder import output_folder
+from screwkin.cli.options import AsJson, OutputFolder, RobotName
+from screwkin.cli.output import aligned, print_json, remark
+from screwkin.files import atomic_write
+from screwkin.model.dh_csv import dh_text
+from screwkin.model.table import load_robot
+
+_WAYS = {
+    "dh": "DH frames",
+    "screw": "screws, successive displacements",
+    "screw_best_reference": "screws, best reference frame",
+    "screw_by_steps": "screws, from axis to axis",
+}
+
+
+def compare(
+    robot: RobotName,
+    samples: Annotated[
+        int, typer.Option(help="Random joint positions at which the models are compared.")
+    ] = 1000,
+    rounds: Annotated[int, typer.Option(help="Alternating rounds of time measurement.")] = 21,
+    plots: Annotated[bool, typer.Option(help="Draw what misaligned axes do to either model.")] = True,
+    output: OutputFolder = None,
+    as_json: AsJson = False,
+) -> int:
+    """Compare the screw model of a robot with its Denavit-Hartenberg model.
+
+    Makes dh.csv (the tables: those beside the robot's file, the others derived) and misalignment.png. Exit
+    code 3 if the models disagree by more than 1e-9.
+    """
+    table = load_robot(robot)
+    with output_folder(output, "compare", table.name) as folder:
+        found = compare_models(table, samples, rounds)
+        files = _write(found, folder, plots)
+    if as_json:
+        print_json({**found.to_dict(), "folder": str(folder)})
+    else:
+        print(_text(found))
+        print(f"files in {folder}: {', '.join(path.name for path in files)}")
+    agree = max(found.fk_max_abs, found.jacobian_max_abs) <= 1e-9
+    if not agree:
+        remark("the DH tables do not describe this robot")
+    return 0 if agree else 3
+
+
+def _write(found: Comparison, folder: Path, plots: bool) -> list[Path]:
+    files = [folder / "dh.csv"]
+    with atomic_write(files[0]) as file:
+        file.write(dh_text([chain.table for chain in found.chains]))
+    if plots and found.misalignment is not None:
+        from screwkin.report.misalignment import save_misalignment
+
+        files.append(save_misalignment(found.misalignment, folder / "misalignment.png"))
+    return files
+
+
+def _text(found: Comparison) -> str:
+    printed = [chain.name for chain in found.chains if chain.printed]
+    others = "" if len(printed) == len(found.chains) else ", the others derived"
+    tables = f"of {', '.join(printed)} from file{others}" if printed else "derived from the screws"
+    numbers = found.parameters
+    told = [
+        ("", "DH", "screws"),
+        ("largest difference of a tip's pose", f"{found.fk_max_abs:.1e}", ""),
+        ("largest difference of a Jacobian", f"{found.jacobian_max_abs:.1e}", ""),
+        ("models for a walk" if found.dh_models > 1 else "models", found.dh_models, found.screw_models),
+        ("Jacobians", found.dh_jacobians, found.screw_jacobians),
+        ("numbers in one model", numbers["dh_per_model"], numbers["screw"]),
+        ("  of these not zero", numbers["dh_not_zero"], numbers["screw_not_zero"]),
+        ("numbers in all models", numbers["dh"], numbers["screw"]),
+        (
+            "change of numbers per change of axes",
+            *(f"{found.sensitivity[way]:.1e}" for way in ("dh", "screw")),
+        ),
+    ]
+    parts = [f"{found.robot}: DH tables {tables}", aligned(told, "  "), "", _ways(found), _tilt(found)]
+    return "\n".join(part for part in parts if part is not None)
+
+
+def _ways(found: Comparison) -> str:
+    """Operations and times by way of computing."""
+    rows: list[Sequence[object]] = [
+        ("operations after elimination of common parts", "FK", "Jacobian", "both", "time")
+    ]
+    for way, name in _WAYS.items():
+        count = found.operations[way]
+        time = f"{1e6 * found.seconds[way]:.0f} us" if way in found.seconds else ""
+        rows.append((f"  {name}", count["fk"], count["jacobian"], count["both"], time))
+    return aligned(rows, "  ")
+
+
+def _tilt(found: Comparison) -> str | None:
+    """What the smallest tilt does, in words."""
+    series = found.misalignment
+    if series is None:
+        return None
+    length = max(series.dh_length)
+    return (
+        f"\n  {series.joints[1]} tilted by {series.tilt[-1]:.0e} rad against {series.joints[0]}: "
+        f"a DH length changes by {length:.1e} m, a number of the screw table by {series.screw_change[-1]:.0e}"
+    )
