@@ -51,20 +51,20 @@ def footholds(gait: Gait, stance: Stance, steps: int) -> tuple[Foothold, ...]:
 
     With P(n) the place of the waist at the boundary before step n: ``alternate`` lands at P(n + 1.5), half
     a step ahead of the waist, as the walking paper (eq. 19-20); ``close`` lands the leading foot (even n)
-    at P(n + 2) and the closing one beside it at P(n + 1).
+    at P(n + 2) and the closing one beside it at P(n + 1); ``parallel`` starts at P(0) and lands at P(n + 1),
+    the last swing beside the foot that stands.
     """
     path, lead = path_of(gait), first_side(gait)
-    alternate = gait.footholds == "alternate"
 
     def hold(side: int, step: int, s: float) -> Foothold:
         x, y, yaw = path.place(np.array(s), side * (stance.foot_y + gait.spread)).tolist()
         return Foothold(stance.foot(side).name, step, x, y, yaw)
 
-    half = 0.5 if alternate else 0.0
+    half = 0.5 if gait.footholds == "alternate" else 0.0
     holds = [hold(lead, -1, -half), hold(-lead, -1, half)]
     for n in range(steps):
-        ahead = 1.5 if alternate else 2.0 - n % 2
-        holds.append(hold(swing_side(gait, n), n, n + ahead))
+        landing = {"alternate": n + 1.5, "close": n + 2.0 - n % 2, "parallel": min(n + 1.0, steps - 1.0)}
+        holds.append(hold(swing_side(gait, n), n, landing[gait.footholds]))
     return tuple(holds)
 
 

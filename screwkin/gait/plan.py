@@ -83,7 +83,7 @@ def plan(gait: Gait, stance: Stance, steps: int) -> Plan:
 
     Source: walking paper (docs/papers.md, A), eq. 16-24, generalised to arcs and to stepping sideways.
     """
-    steps = _whole(steps)
+    steps = whole_steps(steps)
     if gait.kind != "geometric":
         found = f"a gait of kind {gait.kind!r} is not made of key points alone"
         raise GaitError(_where(gait), [Fault("[gait]", "kind", found, 'Give one of kind "geometric"')])
@@ -91,10 +91,30 @@ def plan(gait: Gait, stance: Stance, steps: int) -> Plan:
     time = sample_times(gait, timing)
     with np.errstate(all="ignore"):  # absurd sizes are told below, in words
         phase = timing.phase(time)
-        holds = footholds(gait, stance, steps)
-        feet, contact = feet_motion(gait, stance, holds, phase)
         progress, side = waist_path(gait, steps).motions(phase)
         waist = path_of(gait).follow(progress, side, gait.waist_height)
+    boundaries = timing.time_of(np.arange(steps + 1.0))
+    return plan_around(gait, stance, steps, time, phase, waist, boundaries, _notes(gait, timing))
+
+
+def plan_around(
+    gait: Gait,
+    stance: Stance,
+    steps: int,
+    time: Array,
+    phase: Motion,
+    waist: Motion,
+    boundaries: Array,
+    notes: tuple[str, ...] = (),
+) -> Plan:
+    """The plan whose waist moves as given, x, y, z, yaw (T, 4), with feet and hands by the gait's phase (T,).
+
+    Raises:
+        GaitError: a swing below the floor, or numbers too large. NoSolutionError: the soles overlap.
+    """
+    with np.errstate(all="ignore"):
+        holds = footholds(gait, stance, steps)
+        feet, contact = feet_motion(gait, stance, holds, phase)
         hands = hands_motion(gait, stance, waist, phase)
     _check_finite(gait, {"waist": waist, **feet, **hands})
     gap = check_soles(gait, stance, feet, time)
@@ -115,9 +135,9 @@ def plan(gait: Gait, stance: Stance, steps: int) -> Plan:
         contact=_kept(contact),
         feet=tuple(foot.name for foot in stance.feet),
         footholds=holds,
-        boundaries=_kept(timing.time_of(np.arange(steps + 1.0))),
+        boundaries=_kept(boundaries),
         sole_gap=gap,
-        notes=_notes(gait, timing),
+        notes=notes,
     )
 
 
@@ -136,7 +156,8 @@ def sample_times(gait: Gait, timing: Timing) -> Array:
     return timing.samples(gait.rate)
 
 
-def _whole(steps: object) -> int:
+def whole_steps(steps: object) -> int:
+    """The number of steps, if it is a whole number above 0."""
     if isinstance(steps, bool) or not isinstance(steps, int | np.integer) or steps < 1:
         raise InputError(f"steps is {steps!r}; expected a whole number, at least 1")
     return int(steps)

@@ -19,14 +19,15 @@ from screwkin.model.expression import near, resolve_parameters
 
 Kind = Literal["geometric", "preview"]
 Swing = Literal["cubic", "minimum-jerk"]
-Footholds = Literal["alternate", "close"]
+Footholds = Literal["alternate", "close", "parallel"]
 Side = Literal["right", "left"]
 
 TEXTS = ("name", "description", "source")
 CHOICES: Mapping[str, tuple[str, ...]] = {
     "kind": ("geometric", "preview"),
     "swing": ("minimum-jerk", "cubic"),
-    "footholds": ("alternate", "close"),
+    "footholds": ("alternate", "close", "parallel"),
+    "com": ("true", "waist"),
     "first": ("right", "left"),
 }
 """Parameters that choose; the first one is the default."""
@@ -61,9 +62,11 @@ class Gait:
     about the vertical. lift: height of a swing. waist_height: of the base above the floor. hand_drop: hands
     below their shoulders. sway: factor on the lateral motion of the waist. spread: added to each foot's
     distance from the middle. ramp: steps over which the gait starts and stops (0: at once). rate: samples
-    per second. footholds: ``alternate`` (each foot passes the other) or ``close`` (one leads, the other
-    closes up); first: the foot that swings first. swing: spline of a swing. numbers: all of these and the
-    file's own parameters. channels: key points. waist: coefficients of a free waist path, or empty.
+    per second. footholds: ``alternate`` (each foot passes the other), ``close`` (one leads, the other closes
+    up) or ``parallel`` (as alternate, but from feet side by side to feet side by side); first: the foot that
+    swings first. com: what a preview gait steers, the ``true`` CoM of all links or, naively, the ``waist``.
+    swing: spline of a swing. numbers: all of these and the file's own parameters. channels: key points.
+    waist: coefficients of a free waist path, or empty.
     """
 
     name: str
@@ -84,6 +87,7 @@ class Gait:
     swing: Swing
     footholds: Footholds
     first: Side
+    com: Literal["true", "waist"]
     numbers: Mapping[str, float]
     channels: Mapping[str, Channel]
     waist: Mapping[str, tuple[float, ...]]

@@ -1,73 +1,28 @@
-"""From a gait to a trajectory: positions by closing the loops, rates and accelerations by Davies' method."""
+"""From a gait to a trajectory: plan, positions, rates, accelerations, and the balance of it all."""
 
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 import numpy as np
 
 from screwkin.dynamics.support import support_margin
-from screwkin.errors import InputError, SingularError
 from screwkin.gait.balance import ground_reaction, soles_on_floor
-from screwkin.gait.balance import sole_corners as corners_of
 from screwkin.gait.plan import Plan, plan
+from screwkin.gait.preview_plan import preview_plan
+from screwkin.gait.realise import differentiate, positions, stance_of
 from screwkin.gait.record import Gait
-from screwkin.gait.stance import LEFT, RIGHT, Foot, Hand, Stance
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.mechanism.choice import closed_mechanism
-from screwkin.mechanism.mechanism import Mechanism
-from screwkin.mechanism.network import blend, coupling_twists, network_matrix
-from screwkin.mechanism.virtual_motion import primary_motion
 from screwkin.model.robot import Robot
-from screwkin.model.state import State
-from screwkin.se3 import Twist, as_array, pose_from_array, twist_from_array, unstack, vector_from_array
-from screwkin.solve.pose import solve_pose
-from screwkin.solve.rates import SecondarySolution, secondary_accelerations, secondary_rates
-from screwkin.solve.status import Status
+from screwkin.se3 import as_array, pose_from_array, unstack
 from screwkin.trajectory import Trajectory
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 TRACED = ("numpy", "scipy", "screwkin")
-
-
-def stance_of(robot: Robot) -> Stance:
-    """What a gait must know of a robot, read from its table at the home posture.
-
-    Raises:
-        InputError: no ``home`` posture, not one leg on either side, or a leg without sole.
-    """
-    if "home" not in [posture.name for posture in robot.postures]:
-        raise InputError(f"robot {robot.name} has no posture 'home'; a walk needs one with bent knees")
-    D = link_displacements(robot, list(robot.posture("home").q))
-    feet, hands, places = [], [], []
-    for limb in robot.limbs:
-        p = frame_pose(robot, D, limb.tip).p
-        side = LEFT if p.y > 0 else RIGHT
-        if limb.kind == "leg":
-            outline = tuple((float(x), float(y)) for x, y, _ in corners_of(robot, limb.tip))
-            feet.append(Foot(limb.tip, side, outline))
-            places.append(abs(float(p.y)))
-        else:
-            root = robot.joints[robot.path_to(limb.link)[0]].screw.s0
-            hands.append(Hand(limb.tip, side, (float(root.x), float(root.y), float(root.z))))
-    if sorted(foot.side for foot in feet) != [RIGHT, LEFT]:
-        raise InputError(f"robot {robot.name} has {len(feet)} legs; a walk needs one on either side")
-    return Stance(sum(places) / len(places), tuple(feet), tuple(hands))
-
-
-@dataclass(frozen=True, eq=False)
-class Motion:
-    """Positions and their derivatives (T, n), and every limb's least singular value (T, limbs)."""
-
-    q: Array
-    qd: Array
-    qdd: Array
-    sigma: Array
-    limbs: tuple[str, ...]
 
 
 def walk(robot: Robot, gait: Gait, steps: int = 8, command: str = "") -> Trajectory:
@@ -87,13 +42,13 @@ def walk(robot: Robot, gait: Gait, steps: int = 8, command: str = "") -> Traject
         UnreachableError, SingularError, LimitError: names limb, sample and time.
         GaitError, InputError: the gait does not fit the robot.
     """
-    made = plan(gait, stance_of(robot), steps)
     mechanism = closed_mechanism(robot)
-    tips = _targets(robot, mechanism, made)
-    guess = State(made.T_world_base, np.array(robot.posture("home").q))
-    solution = solve_pose(robot, {"base": made.T_world_base, **tips}, guess)
-    solution.raise_on_failure(robot, made.time)
-    motion = _differentiate(mechanism, made, solution.state)
+    if gait.kind == "preview":
+        made = preview_plan(robot, mechanism, gait, steps)
+    else:
+        made = plan(gait, stance_of(robot), steps)
+    solution = positions(robot, mechanism, made)
+    motion = differentiate(mechanism, made, solution.state)
     tip_poses = _tip_poses(robot, made, motion.q)
     zmp, com, _, _ = ground_reaction(
         robot, made.T_world_base, motion.q, motion.qd, motion.qdd, made.base_twist, made.base_acceleration
@@ -130,67 +85,6 @@ def walk(robot: Robot, gait: Gait, steps: int = 8, command: str = "") -> Traject
             "command": command,
         },
     )
-
-
-def _targets(robot: Robot, mechanism: Mechanism, made: Plan) -> dict[str, Array]:
-    """Poses of the feet; of the hands the positions, or poses level with the waist where all is imposed."""
-    home = link_displacements(robot, list(robot.posture("home").q))
-    targets: dict[str, Array] = dict(made.T_world_tip)
-    for hand, position in made.hand_position.items():
-        if not _turns(mechanism, hand):
-            targets[hand] = position
-            continue
-        level = as_array(frame_pose(robot, home, hand).R)
-        pose = made.T_world_base.copy()
-        pose[:, :3, :3] = made.T_world_base[:, :3, :3] @ level
-        pose[:, :3, 3] = position
-        targets[hand] = pose
-    return targets
-
-
-def _turns(mechanism: Mechanism, tip: str) -> bool:
-    """True if the rotations of a tip's chain are imposed, not monitored."""
-    return any(name.startswith(f"{tip}.r") for name in mechanism.primary)
-
-
-def _differentiate(mechanism: Mechanism, made: Plan, state: State) -> Motion:
-    """Rates and accelerations of the joints from those of the plan, through N and its derivative."""
-    q, T = unstack(state.q), pose_from_array(made.T_world_base)
-    twists = coupling_twists(mechanism, T.R, q)
-    N = network_matrix(mechanism, twists, (len(made.time),))
-    first, second = _imposed(made, 0), _imposed(made, 1)
-    order, batch = mechanism.primary, (len(made.time),)
-    rates = primary_motion(mechanism, T, q, first)
-    primary = as_array([rates[name] for name in order], batch)
-    secondary = secondary_rates(mechanism, N, primary)
-    _refuse_singular(secondary, made)
-    everything = blend(mechanism.primary_columns, primary, mechanism.secondary_columns, secondary.values)
-    accelerations = primary_motion(mechanism, T, q, first, second)
-    driven = as_array([accelerations[name] for name in order], batch)
-    bent = secondary_accelerations(mechanism, twists, N, everything, driven)
-    changes = blend(mechanism.primary_columns, driven, mechanism.secondary_columns, bent.values)
-    real = [mechanism.position[name] for name in mechanism.robot.joint_names]
-    return Motion(state.q, everything[:, real], changes[:, real], secondary.sigma, secondary.blocks)
-
-
-def _imposed(made: Plan, order: int) -> dict[str, Twist]:
-    """Twists (order 0) or their derivatives (1) of waist, feet and hands; hands turn with the waist."""
-    base = twist_from_array((made.base_twist, made.base_acceleration)[order])
-    tips = (made.tip_twist, made.tip_acceleration)[order]
-    hands = (made.hand_velocity, made.hand_acceleration)[order]
-    moved = {"waist": base, **{name: twist_from_array(value) for name, value in tips.items()}}
-    return moved | {name: Twist(base.omega, vector_from_array(value)) for name, value in hands.items()}
-
-
-def _refuse_singular(secondary: SecondarySolution, made: Plan) -> None:
-    if secondary.singular.any():
-        sample, block = (int(i) for i in np.argwhere(secondary.singular)[0])
-        raise SingularError(
-            f"{secondary.blocks[block]}, sample {sample} (t = {made.time[sample]:.3f} s): singular; "
-            f"{Status.SINGULAR.help}",
-            secondary.blocks[block],
-            sample,
-        )
 
 
 def _tip_poses(robot: Robot, made: Plan, q: Array) -> dict[str, Array]:

@@ -1,0 +1,241 @@
+"""The plan of a preview gait: a CoM motion for a ZMP that goes from foot to foot, and the waist to give it.
+
+Time falls into phases of Tc: the robot stands in the first and the last one, and swings once in each between.
+In the first ``dsp`` of a phase both feet bear, while the reference moves linearly to the sole that will bear.
+The CoM is that of all links. It has no fixed place in the waist, so the waist is found by Newton's method,
+for positions, rates and accelerations in turn. Source: Kajita et al. (2003); walking with the waist taken for
+the CoM (``com = "waist"``) is what the second paper does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from screwkin.dynamics.newton_euler import Bodies, momentum
+from screwkin.errors import Fault, GaitError, NoSolutionError
+from screwkin.gait.balance import ground_reaction
+from screwkin.gait.footsteps import Foothold, footholds, swing_side
+from screwkin.gait.motion import Motion, along
+from screwkin.gait.path import path_of
+from screwkin.gait.plan import Plan, plan_around, whole_steps
+from screwkin.gait.preview import CartMotion, follow_reference, preview_gains
+from screwkin.gait.realise import differentiate, positions, stance_of
+from screwkin.gait.record import Gait
+from screwkin.gait.stance import Stance
+from screwkin.mechanism.mechanism import Mechanism
+from screwkin.model.robot import Robot
+from screwkin.model.state import State
+from screwkin.se3 import as_array, pose_from_array, twist_from_array, unstack
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+SETTINGS = ("dsp", "horizon", "Qe", "Qx", "R")
+"""Numbers that a preview gait's file gives in ``[parameters]``."""
+
+TRACKED = 1e-9
+"""How closely the CoM follows its reference [m]."""
+
+
+def preview_plan(robot: Robot, mechanism: Mechanism, gait: Gait, steps: int) -> Plan:
+    """The plan of a gait of kind ``preview``.
+
+    Args:
+        robot: with two legs, soles and a ``home`` posture.
+        mechanism: its closed mechanism.
+        gait: ``dsp`` (fraction of Tc), ``horizon`` [s], ``Qe``, ``Qx``, ``R`` are its own parameters.
+        steps: number of swings, at least 1.
+
+    Returns:
+        Plan of (steps + 2) Tc rate samples.
+
+    Raises:
+        GaitError: a setting is missing or wrong. NoSolutionError: out of reach, or soles that overlap.
+    """
+    steps = whole_steps(steps)
+    settings = _settings(gait)
+    stance = stance_of(robot)
+    count = round((steps + 2) * gait.Tc * gait.rate)
+    time = np.arange(count) / gait.rate
+    phase = _phase(time, gait.Tc, steps)
+    reference = zmp_reference(gait, stance, footholds(gait, stance, steps), steps, time)
+
+    boundaries = gait.Tc * np.arange(1.0, steps + 2.0)
+
+    def around(cart: CartMotion, part: slice = slice(None)) -> Plan:
+        now = Motion(phase.value[part], phase.rate[part], phase.acceleration[part])
+        return plan_around(gait, stance, steps, time[part], now, _waist(gait, cart, now), boundaries)
+
+    height = gait.waist_height
+    if gait.com == "true":
+        rest = np.zeros((1, 2))
+        standing = around(CartMotion(reference[:1], rest, rest, reference[:1]), slice(1))
+        stand, q = _followed(robot, mechanism, standing, reference[:1])
+        height = _com(robot, stand, q)[0, 2]
+    gains = preview_gains(
+        1 / gait.rate, height, settings["horizon"], settings["Qe"], settings["Qx"], settings["R"]
+    )
+    cart = follow_reference(gains, reference)
+    made = around(cart)
+    if gait.com == "waist":
+        return replace(made, notes=("the waist is taken for the CoM",))
+    return _tracked(robot, mechanism, made, cart)
+
+
+def zmp_reference(gait: Gait, stance: Stance, holds: tuple[Foothold, ...], steps: int, time: Array) -> Array:
+    """Wanted ZMP (T, 2): at rest between the feet, else in the middle of the sole that bears [m]."""
+    places = [0.5 * (_middle(stance, holds[0]) + _middle(stance, holds[1]))]
+    stand = {hold.foot: hold for hold in holds[:2]}
+    for n in range(steps):
+        bearing = stance.foot(-swing_side(gait, n))
+        places.append(_middle(stance, stand[bearing.name]))
+        stand[holds[n + 2].foot] = holds[n + 2]
+    first, second = stand.values()
+    places.append(0.5 * (_middle(stance, first) + _middle(stance, second)))
+    number = np.clip(np.floor(time / gait.Tc + 1e-9).astype(int), 0, steps + 1)
+    share = np.clip((time / gait.Tc - number) / gait.numbers["dsp"], 0.0, 1.0)[:, None]
+    levels = np.array([places[0], *places])
+    return np.asarray(levels[number] + share * (levels[number + 1] - levels[number]))
+
+
+def _middle(stance: Stance, hold: Foothold) -> Array:
+    """The middle of a sole on its foothold, seen from above [m]."""
+    outlines = {foot.name: foot.sole for foot in stance.feet}
+    x, y = np.mean(outlines[hold.foot], axis=0)
+    c, s = np.cos(hold.yaw), np.sin(hold.yaw)
+    return np.array([hold.x + c * x - s * y, hold.y + s * x + c * y])
+
+
+def _settings(gait: Gait) -> dict[str, float]:
+    faults = []
+    for name in SETTINGS:
+        if name not in gait.numbers:
+            faults.append(Fault("[parameters]", name, "missing", "A preview gait needs it"))
+    numbers = {name: gait.numbers.get(name, np.nan) for name in SETTINGS}
+    lifted = gait.channels["foot_height"].at[0]
+    if not 0 < numbers["dsp"] <= lifted + 1e-12:
+        found = f"{numbers['dsp']:g} does not lie above 0 and up to liftoff at {lifted:g} Tc"
+        faults.append(Fault("[parameters]", "dsp", found, "The ZMP must arrive before the foot leaves"))
+    if numbers["horizon"] < gait.Tc:
+        found = f"{numbers['horizon']:g} s is shorter than a step of {gait.Tc:g} s"
+        faults.append(Fault("[parameters]", "horizon", found, "Look at least one step ahead"))
+    faults += [
+        Fault("[parameters]", name, f"{numbers[name]:g} is out of range", f"Give a number {least}")
+        for name, bad, least in (
+            ("Qe", numbers["Qe"] <= 0, "above 0"),
+            ("Qx", numbers["Qx"] < 0, "of at least 0"),
+            ("R", numbers["R"] <= 0, "above 0"),
+        )
+        if bad
+    ]
+    if faults:
+        raise GaitError(gait.path or f"gait {gait.name}", faults)
+    return numbers
+
+
+def _phase(time: Array, Tc: float, steps: int) -> Motion:
+    """Phase of the swings, from 0 at the end of the first standing phase; feet rest where its rate jumps."""
+    value = np.clip(time / Tc - 1, 0.0, float(steps))
+    moving = (value > 0) & (value < steps)
+    return Motion(value, np.where(moving, 1 / Tc, 0.0), np.zeros_like(time))
+
+
+def _waist(gait: Gait, cart: CartMotion, phase: Motion) -> Motion:
+    """Waist x, y, z, yaw (T, 4): over the cart, turning with the path by a quintic blend in each step."""
+
+    def blended(p: Array, order: int) -> Array:
+        u = p - np.floor(p)
+        if order == 0:
+            return np.asarray(np.floor(p) + u**3 * (10 + u * (6 * u - 15)))
+        return 30 * (u * (1 - u)) ** 2 if order == 1 else 60 * u * (1 - u) * (1 - 2 * u)
+
+    turning = along(blended, phase) * path_of(gait).turn
+    columns = [
+        np.column_stack([flat, np.full(len(flat), height), yaw])
+        for flat, height, yaw in (
+            (cart.com, gait.waist_height, turning.value),
+            (cart.velocity, 0.0, turning.rate),
+            (cart.acceleration, 0.0, turning.acceleration),
+        )
+    ]
+    return Motion(*columns)
+
+
+def _com(robot: Robot, made: Plan, q: Array) -> Array:
+    still = np.zeros_like(q)
+    rest = np.zeros((len(q), 6))
+    return ground_reaction(robot, made.T_world_base, q, still, still, rest, rest)[1]
+
+
+def _followed(robot: Robot, mechanism: Mechanism, made: Plan, wanted: Array) -> tuple[Plan, Array]:
+    """The plan with its waist moved until the CoM stands over ``wanted`` (T, 2), and its joint positions."""
+    q = positions(robot, mechanism, made).state.q
+    share = _share(robot, mechanism, made, q)
+    for _ in range(20):
+        error = wanted - _com(robot, made, q)[:, :2]
+        if np.abs(error).max() < TRACKED:
+            return made, q
+        made = _moved(made, _solved(share, error))
+        q = positions(robot, mechanism, made, q).state.q
+    far = 1e3 * np.abs(error).max()
+    raise NoSolutionError(f"the waist cannot bring the CoM to its reference; {far:.2g} mm are missing")
+
+
+def _tracked(robot: Robot, mechanism: Mechanism, made: Plan, cart: CartMotion) -> Plan:
+    """The plan whose CoM of all links follows the cart, in all three derivatives."""
+    made, q = _followed(robot, mechanism, made, cart.com)
+    share, none = _share(robot, mechanism, made, q), np.zeros_like(cart.com)
+    velocity, _ = _com_rates(robot, mechanism, made, q)
+    made = _driven(made, _solved(share, cart.velocity - velocity), none)
+    _, acceleration = _com_rates(robot, mechanism, made, q)
+    return _driven(made, none, _solved(share, cart.acceleration - acceleration))
+
+
+def _share(robot: Robot, mechanism: Mechanism, made: Plan, q: Array) -> Array:
+    """How the CoM moves with the waist while the feet stay, (T, 2, 2): rates are linear in the waist's."""
+    none = np.zeros((len(q), 2))
+    rest, _ = _com_rates(robot, mechanism, made, q)
+    pushed = [_com_rates(robot, mechanism, _driven(made, none + e, none), q)[0] for e in np.eye(2)]
+    return np.stack([moved - rest for moved in pushed], axis=-1)
+
+
+def _solved(share: Array, wanted: Array) -> Array:
+    return np.asarray(np.linalg.solve(share, wanted[..., None])[..., 0])
+
+
+def _moved(made: Plan, by: Array) -> Plan:
+    """The plan with its waist, and the hands that hang from it, moved (T, 2) [m]."""
+    T = made.T_world_base.copy()
+    T[:, :2, 3] += by
+    hands = {name: _added(p, by) for name, p in made.hand_position.items()}
+    return replace(made, T_world_base=T, hand_position=hands)
+
+
+def _driven(made: Plan, velocity: Array, acceleration: Array) -> Plan:
+    """The plan with velocities and accelerations (T, 2) added to waist and hands."""
+    return replace(
+        made,
+        base_twist=_added(made.base_twist, velocity, 3),
+        base_acceleration=_added(made.base_acceleration, acceleration, 3),
+        hand_velocity={name: _added(v, velocity) for name, v in made.hand_velocity.items()},
+        hand_acceleration={name: _added(a, acceleration) for name, a in made.hand_acceleration.items()},
+    )
+
+
+def _added(array: Array, by: Array, at: int = 0) -> Array:
+    changed = array.copy()
+    changed[:, at : at + 2] += by
+    return changed
+
+
+def _com_rates(robot: Robot, mechanism: Mechanism, made: Plan, q: Array) -> tuple[Array, Array]:
+    """Velocity and acceleration of the CoM (T, 2), with the joints that the plan asks for."""
+    motion = differentiate(mechanism, made, State(made.T_world_base, q))
+    T, qd = pose_from_array(made.T_world_base), unstack(motion.qd)
+    h = momentum(Bodies.of(robot, T.R, unstack(q)), qd, twist_from_array(made.base_twist))
+    velocity = as_array(h.f, (len(q),)) / robot.mass
+    twists = made.base_twist, made.base_acceleration
+    wrench = ground_reaction(robot, made.T_world_base, q, motion.qd, motion.qdd, *twists)[2]
+    return velocity[:, :2], wrench[:, 3:5] / robot.mass

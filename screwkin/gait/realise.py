@@ -1,0 +1,135 @@
+"""What a plan asks of the joints: positions by closing loops, rates and accelerations by Davies' method."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from screwkin.errors import InputError, SingularError
+from screwkin.gait.balance import sole_corners
+from screwkin.gait.plan import Plan
+from screwkin.gait.stance import LEFT, RIGHT, Foot, Hand, Stance
+from screwkin.kinematics.positions import frame_pose, link_displacements
+from screwkin.mechanism.mechanism import Mechanism
+from screwkin.mechanism.network import blend, coupling_twists, network_matrix
+from screwkin.mechanism.virtual_motion import primary_motion
+from screwkin.model.robot import Robot
+from screwkin.model.state import State
+from screwkin.se3 import Twist, as_array, pose_from_array, twist_from_array, unstack, vector_from_array
+from screwkin.solve.pose import PoseSolution, solve_pose
+from screwkin.solve.rates import SecondarySolution, secondary_accelerations, secondary_rates
+from screwkin.solve.status import Status
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+def stance_of(robot: Robot) -> Stance:
+    """What a gait must know of a robot, read from its table at the home posture.
+
+    Raises:
+        InputError: no ``home`` posture, not one leg on either side, or a leg without sole.
+    """
+    if "home" not in [posture.name for posture in robot.postures]:
+        raise InputError(f"robot {robot.name} has no posture 'home'; a walk needs one with bent knees")
+    D = link_displacements(robot, list(robot.posture("home").q))
+    feet, hands, places = [], [], []
+    for limb in robot.limbs:
+        p = frame_pose(robot, D, limb.tip).p
+        side = LEFT if p.y > 0 else RIGHT
+        if limb.kind == "leg":
+            outline = tuple((float(x), float(y)) for x, y, _ in sole_corners(robot, limb.tip))
+            feet.append(Foot(limb.tip, side, outline))
+            places.append(abs(float(p.y)))
+        else:
+            root = robot.joints[robot.path_to(limb.link)[0]].screw.s0
+            hands.append(Hand(limb.tip, side, (float(root.x), float(root.y), float(root.z))))
+    if sorted(foot.side for foot in feet) != [RIGHT, LEFT]:
+        raise InputError(f"robot {robot.name} has {len(feet)} legs; a walk needs one on either side")
+    return Stance(sum(places) / len(places), tuple(feet), tuple(hands))
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Positions and their derivatives (T, n), and every limb's least singular value (T, limbs)."""
+
+    q: Array
+    qd: Array
+    qdd: Array
+    sigma: Array
+    limbs: tuple[str, ...]
+
+
+def positions(robot: Robot, mechanism: Mechanism, made: Plan, guess: Array | None = None) -> PoseSolution:
+    """Joint positions of a plan; ``guess`` (T, n) or (n,) defaults to the home posture.
+
+    Raises:
+        UnreachableError, SingularError, LimitError: names limb, sample and time.
+    """
+    start = np.array(robot.posture("home").q) if guess is None else guess
+    targets = {"base": made.T_world_base, **_targets(robot, mechanism, made)}
+    solution = solve_pose(robot, targets, State(made.T_world_base, start))
+    solution.raise_on_failure(robot, made.time)
+    return solution
+
+
+def _targets(robot: Robot, mechanism: Mechanism, made: Plan) -> dict[str, Array]:
+    """Poses of the feet; of the hands the positions, or poses level with the waist where all is imposed."""
+    home = link_displacements(robot, list(robot.posture("home").q))
+    targets: dict[str, Array] = dict(made.T_world_tip)
+    for hand, position in made.hand_position.items():
+        if not _turns(mechanism, hand):
+            targets[hand] = position
+            continue
+        level = as_array(frame_pose(robot, home, hand).R)
+        pose = made.T_world_base.copy()
+        pose[:, :3, :3] = made.T_world_base[:, :3, :3] @ level
+        pose[:, :3, 3] = position
+        targets[hand] = pose
+    return targets
+
+
+def _turns(mechanism: Mechanism, tip: str) -> bool:
+    """True if the rotations of a tip's chain are imposed, not monitored."""
+    return any(name.startswith(f"{tip}.r") for name in mechanism.primary)
+
+
+def differentiate(mechanism: Mechanism, made: Plan, state: State) -> Motion:
+    """Rates and accelerations of the joints from those of the plan, through N and its derivative."""
+    q, T = unstack(state.q), pose_from_array(made.T_world_base)
+    twists = coupling_twists(mechanism, T.R, q)
+    N = network_matrix(mechanism, twists, (len(made.time),))
+    first, second = _imposed(made, 0), _imposed(made, 1)
+    order, batch = mechanism.primary, (len(made.time),)
+    rates = primary_motion(mechanism, T, q, first)
+    primary = as_array([rates[name] for name in order], batch)
+    secondary = secondary_rates(mechanism, N, primary)
+    _refuse_singular(secondary, made)
+    everything = blend(mechanism.primary_columns, primary, mechanism.secondary_columns, secondary.values)
+    accelerations = primary_motion(mechanism, T, q, first, second)
+    driven = as_array([accelerations[name] for name in order], batch)
+    bent = secondary_accelerations(mechanism, twists, N, everything, driven)
+    changes = blend(mechanism.primary_columns, driven, mechanism.secondary_columns, bent.values)
+    real = [mechanism.position[name] for name in mechanism.robot.joint_names]
+    return Motion(state.q, everything[:, real], changes[:, real], secondary.sigma, secondary.blocks)
+
+
+def _imposed(made: Plan, order: int) -> dict[str, Twist]:
+    """Twists (order 0) or their derivatives (1) of waist, feet and hands; hands turn with the waist."""
+    base = twist_from_array((made.base_twist, made.base_acceleration)[order])
+    tips = (made.tip_twist, made.tip_acceleration)[order]
+    hands = (made.hand_velocity, made.hand_acceleration)[order]
+    moved = {"waist": base, **{name: twist_from_array(value) for name, value in tips.items()}}
+    return moved | {name: Twist(base.omega, vector_from_array(value)) for name, value in hands.items()}
+
+
+def _refuse_singular(secondary: SecondarySolution, made: Plan) -> None:
+    if secondary.singular.any():
+        sample, block = (int(i) for i in np.argwhere(secondary.singular)[0])
+        raise SingularError(
+            f"{secondary.blocks[block]}, sample {sample} (t = {made.time[sample]:.3f} s): singular; "
+            f"{Status.SINGULAR.help}",
+            secondary.blocks[block],
+            sample,
+        )
