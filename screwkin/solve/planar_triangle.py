@@ -1,0 +1,38 @@
+"""Three parallel axes as a planar triangle: hip pitch, knee and ankle pitch."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from screwkin.scalar import Scalar, minus, times
+from screwkin.screw import Screw
+from screwkin.se3 import Pose, Vector, dot, rotate
+from screwkin.solve.subproblems import turn_onto, turns_to_level
+
+
+def flattened(normal: Vector, a: Vector) -> Vector:
+    """The part of a in the plane with that unit normal."""
+    return a - normal * dot(normal, a)
+
+
+def planar_branches(screws: Sequence[Screw], E: Pose) -> list[tuple[Scalar, Scalar, Scalar]]:
+    """Both triples of positions of three parallel revolute axes that make the planar displacement E.
+
+    Args:
+        screws: the axes in the zero pose, no two neighbours on one line.
+        E: wanted displacement; what it has out of the plane is ignored. Out of reach, the triangle is
+            stretched (or folded) towards it.
+    """
+    hip, knee, ankle = screws
+    upper = flattened(hip.s, knee.s0 - hip.s0)
+    lower = flattened(hip.s, ankle.s0 - knee.s0)
+    wanted = flattened(hip.s, E @ ankle.s0 - hip.s0)
+    # |upper + R4 lower| = |wanted|
+    level = times(minus(minus(dot(wanted, wanted), dot(upper, upper)), dot(lower, lower)), 0.5)
+    branches = []
+    for bend in turns_to_level(knee.s, lower, upper, level):
+        turned = rotate(knee.s, bend)
+        lift = turn_onto(hip.s, upper + turned @ lower, wanted)
+        rest = (rotate(hip.s, lift) @ turned).T @ E.R
+        branches.append((lift, bend, turn_onto(ankle.s, upper, rest @ upper)))
+    return branches
