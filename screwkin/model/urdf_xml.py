@@ -1,0 +1,155 @@
+"""The tree of a URDF file: its links and joints as they stand there, and every fault of names and numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from screwkin.errors import Fault, TableError
+from screwkin.model.robot import JointType
+from screwkin.scalar import structural
+from screwkin.se3 import Pose, Vector, X, Y, Z, rotate
+
+Element = Any
+
+TYPES: Mapping[str, JointType] = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic"}
+"""Joints of URDF that move, and what they are called here."""
+
+
+@dataclass
+class Reader:
+    """What is wrong with a file, and what is left out of it."""
+
+    faults: list[Fault] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
+
+    def fault(self, row: str, key: str, found: str, fix: str) -> None:
+        """Note a fault; reading goes on."""
+        self.faults.append(Fault(row, key, found, fix))
+
+    def numbers(self, row: str, element: Element | None, key: str, default: Sequence[float]) -> list[float]:
+        """Finite numbers of an attribute, as many as the default has."""
+        text = None if element is None else element.get(key)
+        if text is None:
+            return list(default)
+        try:
+            values = [float(word) for word in text.split()]
+        except ValueError:
+            values = []
+        if len(values) != len(default) or not all(map(math.isfinite, values)):
+            self.fault(row, key, f"found {text!r}", f"Write {len(default)} finite number(s)")
+            return list(default)
+        return values
+
+    def origin(self, row: str, element: Element | None) -> Pose:
+        """The pose of an ``origin``: Rz(yaw) Ry(pitch) Rx(roll), then the shift."""
+        child = None if element is None else element.find("origin")
+        x, y, z = self.numbers(row, child, "xyz", (0.0, 0.0, 0.0))
+        roll, pitch, yaw = self.numbers(row, child, "rpy", (0.0, 0.0, 0.0))
+        turned = rotate(Z, structural(yaw)) @ rotate(Y, structural(pitch)) @ rotate(X, structural(roll))
+        return Pose(turned, Vector(x, y, z))
+
+
+def read_root(text: str, path: str) -> Element:
+    """The ``robot`` element of a text.
+
+    Raises:
+        TableError: no XML, not URDF, or with entities and external references, which are never read.
+    """
+    from defusedxml import DefusedXmlException
+    from defusedxml.ElementTree import ParseError, fromstring
+
+    fix = "Give a URDF file: XML with <robot> around <link> and <joint>"
+    try:
+        root = fromstring(text.encode())
+    except ParseError as wrong:
+        raise TableError(path, [Fault("file", "", f"is no XML ({wrong})", fix)]) from None
+    except (DefusedXmlException, ValueError, LookupError) as wrong:
+        found = f"holds what is never read ({type(wrong).__name__})"
+        raise TableError(
+            path, [Fault("file", "", found, "Remove entities and external references")]
+        ) from None
+    if root.tag != "robot":
+        raise TableError(path, [Fault("file", "", f"begins with <{root.tag}>", fix)])
+    return root
+
+
+def named(reader: Reader, root: Element, tag: str) -> Iterator[tuple[str, Element]]:
+    """Elements by name, each name once and once only."""
+    seen = set()
+    for i, element in enumerate(root.findall(tag)):
+        name = element.get("name", "")
+        if not name:
+            reader.fault(f"<{tag}> {i + 1}", "name", "is missing", f"Name the {tag}")
+        elif name in seen:
+            reader.fault(f"<{tag}> {name!r}", "name", "is there twice", f"Give each {tag} a name of its own")
+        else:
+            seen.add(name)
+            yield name, element
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A joint of the file."""
+
+    name: str
+    type: str
+    parent: str
+    child: str
+    origin: Pose
+    axis: Vector
+    element: Element
+
+
+def read_joints(reader: Reader, root: Element, links: Mapping[str, Element]) -> Iterator[Edge]:
+    """The joints, with all their faults."""
+    for name, element in named(reader, root, "joint"):
+        row, kind = f"<joint> {name!r}", element.get("type", "")
+        if kind not in (*TYPES, "fixed"):
+            valid = ", ".join((*TYPES, "fixed"))
+            reader.fault(row, "type", f"is {kind!r}", f"Supported: {valid}")
+        if element.find("mimic") is not None:
+            reader.fault(
+                row, "mimic", "couples two joints", "Remove it, and couple them where they are driven"
+            )
+        ends = []
+        for key in ("parent", "child"):
+            end = element.find(key)
+            link = "" if end is None else end.get("link", "")
+            if link not in links:
+                found = f"there is no link {link!r}" if link else "is missing"
+                reader.fault(row, key, found, f"Write <{key} link=...> with a link of the file")
+            ends.append(link)
+        axis = reader.numbers(row, element.find("axis"), "xyz", (1.0, 0.0, 0.0))
+        length = math.hypot(*axis)
+        if length == 0:
+            reader.fault(row, "axis", "is the zero vector", "Write the direction of the joint's axis")
+            length = 1.0
+        unit = Vector(*(structural(c / length) for c in axis))
+        yield Edge(name, kind, ends[0], ends[1], reader.origin(row, element), unit, element)
+
+
+def base_of(reader: Reader, links: Mapping[str, Element], joints: Sequence[Edge]) -> str:
+    """The one link that no joint carries; faults where the links are no tree."""
+    if reader.faults:
+        return ""
+    carried: dict[str, str] = {}
+    for joint in joints:
+        if joint.child in carried:
+            found = f"link {joint.child!r} is carried by {carried[joint.child]!r} already"
+            reader.fault(f"<joint> {joint.name!r}", "child", found, "Keep one of the joints")
+        carried[joint.child] = joint.name
+    roots = [name for name in links if name not in carried]
+    if len(roots) != 1:
+        found = f"roots: {', '.join(roots)}" if roots else "no root: the joints run in a circle"
+        reader.fault("file", "link", found, "Connect all links to one tree")
+        return ""
+    reached = {roots[0]}
+    for _ in joints:
+        reached |= {joint.child for joint in joints if joint.parent in reached}
+    lost = [name for name in links if name not in reached]
+    if lost:
+        reader.fault("file", "joint", f"{', '.join(lost)} run in a circle", "Connect all links to one tree")
+    return roots[0]
