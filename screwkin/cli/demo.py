@@ -15,6 +15,7 @@ from screwkin.cli.output import aligned, print_json, remark, silent
 from screwkin.cli.simulation import Wish, simulate
 from screwkin.cli.walk import chosen_gait, command_of, make_trajectory, write_report
 from screwkin.errors import MissingDependencyError
+from screwkin.gait.files import default_gait
 from screwkin.gait.record import Gait
 from screwkin.model.library import robot_names
 from screwkin.model.robot import Robot
@@ -31,7 +32,9 @@ def demo(
         str | None,
         typer.Argument(metavar="[ROBOT]", help="A robot's name or table; default: the first bundled one."),
     ] = None,
-    gait: Annotated[str, typer.Option(metavar="NAME|FILE", help="The gait.")] = "walk",
+    gait: Annotated[
+        str | None, typer.Option(metavar="NAME|FILE", help="The gait; default as for walk.")
+    ] = None,
     steps: Annotated[int, typer.Option(help="Number of steps.")] = 6,
     output: OutputFolder = None,
     as_json: AsJson = False,
@@ -42,7 +45,9 @@ def demo(
     """
     tell = _say if not as_json else remark if sys.stderr.isatty() else silent
     name = robot or robot_names()[0]
-    table, chosen = load_robot(name), chosen_gait(gait, [], None)
+    table = load_robot(name)
+    gait = gait or default_gait(table.name)
+    chosen = chosen_gait(gait, [], None)
     with output_folder(output, "demo", table.name) as folder:
         _tell_robot(tell, table)
         facts = facts_of(table)

@@ -12,7 +12,7 @@ import typer
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, RobotName, settings
 from screwkin.cli.output import aligned, print_json, progress_bar, remark
-from screwkin.gait.files import load_gait
+from screwkin.gait.files import default_gait, load_gait
 from screwkin.gait.record import Gait
 from screwkin.gait.walk import walk as walk_of
 from screwkin.model.robot import Robot
@@ -24,14 +24,19 @@ from screwkin.report.numbers import walk_data, walk_numbers
 def walk(
     robot: RobotName,
     gait: Annotated[
-        str, typer.Option(metavar="NAME|FILE", help="A bundled gait's name, or the path of a file.")
-    ] = "walk",
-    steps: Annotated[int, typer.Option(help="Number of steps.")] = 8,
+        str | None,
+        typer.Option(metavar="NAME|FILE", help="A bundled gait's name or a file; default: ROBOT-… or walk."),
+    ] = None,
+    steps: Annotated[int | None, typer.Option(help="Number of steps; default: the gait's.")] = None,
     assignments: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Change a parameter of the gait; may be repeated."),
     ] = None,
     rate: Annotated[float | None, typer.Option(help="Samples per second; default: the gait's.")] = None,
+    com: Annotated[
+        str | None,
+        typer.Option(metavar="true|waist", help="What a preview gait steers: the CoM or the waist."),
+    ] = None,
     plots: Annotated[bool, typer.Option(help="Draw the pictures and write the report.")] = True,
     output: OutputFolder = None,
     as_json: AsJson = False,
@@ -42,8 +47,11 @@ def walk(
     outside the support polygon is told, but the trajectory is still made.
     """
     table = load_robot(robot)
-    chosen = chosen_gait(gait, assignments or [], rate)
-    command = command_of(robot, gait, steps, assignments or [], rate)
+    assignments = [*(assignments or []), *([] if com is None else [f"com={com}"])]
+    name = gait or default_gait(table.name)
+    chosen = chosen_gait(name, assignments, rate)
+    steps = chosen.steps if steps is None else steps
+    command = command_of(robot, name, steps, assignments, rate)
     with output_folder(output, "walk", table.name) as folder:
         account = make_trajectory(table, chosen, steps, command, folder)
         if plots:

@@ -6,8 +6,14 @@ from pathlib import Path
 
 from screwkin.errors import GaitError
 from screwkin.gait.record import Gait, gait_from_dict
-from screwkin.model.library import find_gait
+from screwkin.model.library import find_gait, gait_names
 from screwkin.model.toml import read_text, read_toml
+
+
+def default_gait(robot: str) -> str:
+    """The bundled gait of a robot unless told otherwise: the first named ``ROBOT-…``, else ``walk``."""
+    own = [name for name in gait_names() if name.startswith(f"{robot}-")]
+    return own[0] if own else "walk"
 
 
 def load_gait(name_or_path: str | Path) -> Gait:

@@ -43,6 +43,7 @@ NUMBERS: Mapping[str, float | None] = {
     "sway": 1.0,
     "spread": 0.0,
     "ramp": 1.0,
+    "steps": 8.0,
     "rate": 50.0,
 }
 """Parameters that are numbers, with their defaults; None: the file must say it."""
@@ -61,10 +62,11 @@ class Gait:
     Tc: period of one step. stride, side, turn: displacement of a foot per swing, forward, to the left and
     about the vertical. lift: height of a swing. waist_height: of the base above the floor. hand_drop: hands
     below their shoulders. sway: factor on the lateral motion of the waist. spread: added to each foot's
-    distance from the middle. ramp: steps over which the gait starts and stops (0: at once). rate: samples
-    per second. footholds: ``alternate`` (each foot passes the other), ``close`` (one leads, the other closes
-    up) or ``parallel`` (as alternate, but from feet side by side to feet side by side); first: the foot that
-    swings first. com: what a preview gait steers, the ``true`` CoM of all links or, naively, the ``waist``.
+    distance from the middle. ramp: steps over which the gait starts and stops (0: at once). steps: how many,
+    unless told otherwise. rate: samples per second. footholds: ``alternate`` (each foot passes the other),
+    ``close`` (one leads, the other closes up) or ``parallel`` (as alternate, but from feet side by side to
+    feet side by side); first: the foot that swings first. com: what a preview gait steers, the ``true`` CoM
+    of all links or, naively, the ``waist``.
     swing: spline of a swing. numbers: all of these and the file's own parameters. channels: key points.
     waist: coefficients of a free waist path, or empty.
     """
@@ -83,6 +85,7 @@ class Gait:
     sway: float
     spread: float
     ramp: float
+    steps: int
     rate: float
     swing: Swing
     footholds: Footholds
@@ -142,7 +145,7 @@ def gait_from_dict(document: Mapping[str, Any], path: str = "<gait>") -> Gait:
         raise GaitError(path, faults)
     values = cast(dict[str, float], numbers)
     return Gait(
-        **flat | {name: values[name] for name in NUMBERS},
+        **flat | {name: values[name] for name in NUMBERS} | {"steps": int(values["steps"])},
         numbers=values,
         channels=channels,
         waist=waist,
@@ -214,6 +217,12 @@ def _numbers(flat: Mapping[str, Any], own: Mapping[str, Any], faults: list[Fault
         if value is not None and (value < 0 or (value == 0 and key != "ramp")):
             faults.append(Fault("[gait]", key, f"{value:g} is not {least}", f"Give a number {least}"))
             numbers[key] = None
+    steps = numbers.get("steps")
+    if steps is not None and (steps < 1 or steps != round(steps)):
+        faults.append(
+            Fault("[gait]", "steps", f"{steps:g} is no number of steps", "Give a whole number from 1")
+        )
+        numbers["steps"] = None
     return {name: numbers.get(name) for name in (*NUMBERS, *numbers)}
 
 

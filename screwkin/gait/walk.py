@@ -25,13 +25,13 @@ Array = np.ndarray[Any, np.dtype[np.float64]]
 TRACED = ("numpy", "scipy", "screwkin")
 
 
-def walk(robot: Robot, gait: Gait, steps: int = 8, command: str = "") -> Trajectory:
+def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") -> Trajectory:
     """The whole-body trajectory of a gait.
 
     Args:
         robot: with two legs, soles and a ``home`` posture; arms swing if it has them.
         gait: from ``load_gait``.
-        steps: number of steps, at least 1.
+        steps: number of steps, at least 1; default: the gait's own, 8 unless its file says otherwise.
         command: the command line to record in the file.
 
     Returns:
@@ -42,6 +42,7 @@ def walk(robot: Robot, gait: Gait, steps: int = 8, command: str = "") -> Traject
         UnreachableError, SingularError, LimitError: names limb, sample and time.
         GaitError, InputError: the gait does not fit the robot.
     """
+    steps = gait.steps if steps is None else steps
     mechanism = closed_mechanism(robot)
     if gait.kind == "preview":
         made = preview_plan(robot, mechanism, gait, steps)
