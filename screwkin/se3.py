@@ -244,13 +244,15 @@ def rotation_log(rotation: Rotation) -> Vector:
 
 
 def _quaternion(rotation: Rotation) -> tuple[Scalar, Vector]:
-    """Unit quaternion (w, v) with w >= 0, each component computed without cancellation."""
+    """Unit quaternion (w, v) with w >= 0, each component computed without cancellation.
+
+    For symbols it is not unit, which saves roots: the logarithm needs only the ratio of v to w.
+    """
     (xx, yx, zx), (xy, yy, zy), (xz, yz, zz) = rotation.x, rotation.y, rotation.z
     skew = Vector(zy - yz, xz - zx, yx - xy)
     q0 = (1 + xx + yy + zz, *skew)
     if is_symbolic(q0[0]):
-        scale = 1 / (2 * scalar.sqrt(q0[0]))
-        return q0[0] * scale, skew * scale
+        return q0[0], skew
     candidates = (
         q0,
         (skew.x, 1 + xx - yy - zz, xy + yx, xz + zx),

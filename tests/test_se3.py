@@ -110,6 +110,17 @@ def test_vector_algebra_is_that_of_arrays(a, b):
     assert_close(se3.norm(a), np.linalg.norm(x))
 
 
+@given(twists, twists)
+def test_twists_form_a_vector_space(a, b):
+    x, y = as_array(a), as_array(b)
+    assert_close(a + b, x + y)
+    assert_close(a - b, x - y)
+    assert_close(-a, -x)
+    assert_close(a * 2.5, x * 2.5)
+    assert_close(2.5 * a, x * 2.5)
+    assert_close(a / 3, x / 3)
+
+
 def test_records_are_frozen_and_numpy_leaves_them_whole():
     v = Vector(1.0, 2.0, 3.0)
     with pytest.raises(FrozenInstanceError):
