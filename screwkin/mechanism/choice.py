@@ -13,15 +13,18 @@ from typing import Any
 import numpy as np
 
 from screwkin.errors import InputError, SingularError, UnknownNameError
+from screwkin.kinematics.positions import link_displacements
 from screwkin.mechanism.mechanism import Mechanism, coupling_graph, virtual_chains
 from screwkin.mechanism.network import coupling_twists, network_matrix
 from screwkin.model.robot import Robot
-from screwkin.se3 import UNTURNED, Rotation
+from screwkin.se3 import UNTURNED, Rotation, norm, rotation_log
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
 RANK_TOLERANCE = 1e-6
 """Smallest singular value, relative to the largest, of length-normalised screws still independent."""
+CLOSED = 1e-7
+"""Largest gap of a closure, in sizes of the robot and in rad, at which ranks are decided."""
 
 
 def characteristic_length(robot: Robot) -> float:
@@ -101,7 +104,8 @@ def closed_mechanism(robot: Robot, primary: Sequence[str] | None = None) -> Mech
 
     Raises:
         UnknownNameError: a primary name is no coupling.
-        InputError: too few or too many primary couplings, with the ones to move.
+        InputError: too few or too many primary couplings, with the ones to move; or a closure that is open at
+            the home posture, where ranks would mean nothing.
         SingularError: the right number, but dependent; says which to exchange.
 
     Source: Davies (1981); paper A, eq. 9-11, 15.
@@ -109,6 +113,7 @@ def closed_mechanism(robot: Robot, primary: Sequence[str] | None = None) -> Mech
     chains = virtual_chains(robot)
     graph = coupling_graph(robot, chains)
     bare = Mechanism(robot, chains, graph, (), tuple(name for name, _, _ in graph.edges), 0)
+    _check_closed(robot, reference_posture(robot))
     N = network_at(bare, reference_posture(robot))
     mobility = len(bare.couplings) - rank(N)
     if primary is None:
@@ -126,6 +131,21 @@ def closed_mechanism(robot: Robot, primary: Sequence[str] | None = None) -> Mech
     )
     _check(chosen, N)
     return chosen
+
+
+def _check_closed(robot: Robot, q: Sequence[float]) -> None:
+    """Every closure's two frames coincide at q, to ``CLOSED`` times the robot's size and in rad."""
+    carried = dict(zip(robot.link_names, link_displacements(robot, list(q)), strict=True))
+    length = characteristic_length(robot)
+    for closure in robot.closures:
+        a, b = carried[closure.link_a] @ closure.frame_a, carried[closure.link_b] @ closure.frame_b
+        gap, turn = float(norm(b.p - a.p)), float(norm(rotation_log(b.R @ a.R.T)))
+        if gap > CLOSED * length or turn > CLOSED:
+            raise InputError(
+                f"{robot.name}: closure {closure.name} is open by {1e3 * gap:.3g} mm and "
+                f"{np.degrees(turn):.3g} deg at the posture where the mechanism is examined; give a posture "
+                f"home that closes it, by formulas or to nine digits (solve.closure.nearest_closed finds one)"
+            )
 
 
 def _check(mechanism: Mechanism, N: Array) -> None:

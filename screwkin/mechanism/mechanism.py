@@ -112,12 +112,14 @@ class Mechanism:
 
     @cached_property
     def circuit_names(self) -> tuple[str, ...]:
-        """What each circuit is called: its limb, or the joints that it runs through."""
+        """What each circuit is called: its limb or closure, else the joints that it runs through."""
         tips = {chain.name: chain.limb.name for chain in self.chains if chain.limb}
+        told = list(zip(self.closings, self.closing_matrix, strict=True))
+        closures = {tuple(sign * row): closing.name for closing, row in told for sign in (1, -1)}
         names = []
-        for circuit in self.circuits:
+        for circuit, row in zip(self.circuits, self.circuit_matrix, strict=True):
             limbs = [tips[c.split(".")[0]] for c in circuit if c.split(".")[0] in tips]
-            names.append(limbs[0] if limbs else "-".join(circuit))
+            names.append(limbs[0] if limbs else closures.get(tuple(row), "-".join(circuit)))
         return tuple(names)
 
     @cached_property

@@ -7,21 +7,32 @@ imposed: the position of a four-bar's crank, the legs of a platform, a foot whil
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from screwkin.errors import InputError, UnknownNameError
+from screwkin.errors import InputError, NoSolutionError, UnknownNameError
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.mechanism.chains import chain_coordinates, chain_pose
 from screwkin.mechanism.choice import characteristic_length
-from screwkin.mechanism.mechanism import Mechanism
+from screwkin.mechanism.mechanism import Mechanism, coupling_graph, virtual_chains
 from screwkin.mechanism.network import coupling_twists, network_matrix
+from screwkin.model.robot import Robot
 from screwkin.model.state import State
 from screwkin.scalar import Scalar
 from screwkin.screw import at
-from screwkin.se3 import ZERO, Pose, Twist, as_array, pose_from_array, rotation_log, unstack
+from screwkin.se3 import (
+    IDENTITY,
+    UNTURNED,
+    ZERO,
+    Pose,
+    Twist,
+    as_array,
+    pose_from_array,
+    rotation_log,
+    unstack,
+)
 from screwkin.solve.newton import newton
 from screwkin.solve.pose import CLOSED, SINGULAR
 from screwkin.solve.status import Status
@@ -159,6 +170,36 @@ def close_loops(mechanism: Mechanism, guess: State, imposed: Mapping[str, Array]
         result.residual.reshape(batch),
         result.iterations.reshape(batch),
     )
+
+
+def nearest_closed(robot: Robot, q: Array) -> Array:
+    """Joint positions (n,) near q at which every closure of a table closes: for a posture written by eye.
+
+    Raises:
+        NoSolutionError: none is found from there; the message tells the gap that is left.
+    """
+    single = replace(robot, limbs=())
+    chains = virtual_chains(single)
+    graph = coupling_graph(single, chains)
+    mechanism = Mechanism(single, chains, graph, (), tuple(name for name, _, _ in graph.edges), 0)
+    order = [mechanism.position[name] for name in robot.joint_names]
+    length = characteristic_length(robot)
+    scale = np.tile([1.0, 1.0, 1.0, 1 / length, 1 / length, 1 / length], len(mechanism.closings))
+
+    def residual(joints: Array, samples: Array) -> tuple[Array, Array]:
+        full = np.zeros((len(joints), len(mechanism.couplings)))
+        full[:, order] = joints
+        missing = as_array(closure_errors(mechanism, unstack(full), IDENTITY), (len(joints),))
+        twists = coupling_twists(mechanism, UNTURNED, unstack(joints))
+        N = network_matrix(mechanism, twists, (len(joints),), mechanism.closing_matrix)
+        return missing.reshape(len(joints), -1) * scale, N[..., order] * scale[:, None]
+
+    result = newton(residual, np.asarray(q, dtype=float)[None])
+    if result.residual[0] > CLOSED:
+        raise NoSolutionError(
+            f"{robot.name}: no closed posture near this one; {result.residual[0]:.3g} is left"
+        )
+    return result.x[0]
 
 
 def _beyond_limits(mechanism: Mechanism, x: Array) -> Array:

@@ -9,11 +9,12 @@ import pytest
 import sympy
 
 import screwkin as sk
-from screwkin.errors import SingularError
+from screwkin.errors import InputError, NoSolutionError, SingularError
+from screwkin.kinematics.positions import link_displacements
 from screwkin.model.robot import Limb
 from screwkin.model.table import load_robot, parse_robot
 from screwkin.se3 import UNTURNED, Pose, Vector
-from screwkin.solve.closure import close_loops
+from screwkin.solve.closure import close_loops, nearest_closed
 from screwkin.solve.status import Status
 from tests.kinematics.machines import SPATIAL
 
@@ -189,11 +190,56 @@ def test_bennetts_linkage_turns_by_its_half_angle_relation(mechanisms):
 
 
 def test_without_bennetts_condition_the_same_bars_are_rigid():
+    """The closing frame is put where the open chain ends, so that both loops are closed at home."""
     text = load_robot("linkages/bennett").text
-    wrong = parse_robot(text.replace('"asin(b/a*sin(alpha))"', '"55*deg"'))
-    assert np.sin(wrong.parameters["alpha"]) / 0.10 != pytest.approx(np.sin(wrong.parameters["beta"]) / 0.15)
-    assert sk.closed_mechanism(wrong).mobility == 0
-    assert sk.closed_mechanism(parse_robot(text)).mobility == 1
+    for beta, mobility in ((np.arcsin(1.5 * np.sin(np.radians(30))), 1), (np.radians(55), 0)):
+        bars = parse_robot(text.replace('"asin(b/a*sin(alpha))"', repr(float(beta))))
+        D = link_displacements(bars, list(bars.posture("home").q))[-1]
+        (loop,) = bars.closures
+        loop = replace(loop, frame_b=D @ loop.frame_a)
+        assert sk.closed_mechanism(replace(bars, closures=(loop,))).mobility == mobility
+
+
+def test_a_loop_that_is_open_at_home_is_refused_with_its_gap():
+    """Ranks decided there would mean nothing: a four-bar in one line seems to have two freedoms."""
+    text = load_robot("linkages/four-bar").text
+    with pytest.raises(
+        InputError, match=r"four-bar: closure loop is open by .* mm and .* deg at the posture"
+    ):
+        sk.closed_mechanism(parse_robot(text.split("[[posture]]")[0]))
+
+
+def test_a_posture_written_by_eye_is_closed_by_the_nearest_one():
+    robot = load_robot("linkages/four-bar")
+    exact = np.array(robot.posture("home").q)
+    rough = replace(robot, postures=(replace(robot.posture("home"), q=tuple(np.round(exact, 2))),))
+    with pytest.raises(InputError, match="closure loop is open"):
+        sk.closed_mechanism(rough)
+    q = nearest_closed(rough, np.round(exact, 2))
+    assert np.abs(q - exact).max() < 0.02
+    closed = replace(robot, postures=(replace(robot.posture("home"), q=tuple(q.tolist())),))
+    assert sk.closed_mechanism(closed).mobility == 1
+
+
+def test_bars_that_cannot_meet_have_no_closed_posture():
+    text = load_robot("linkages/four-bar").text.replace("ground = 0.20", "ground = 0.50")
+    text = text.split("# The posture")[0] + "[[link]]" + text.split("[[link]]", 1)[1].split("[[posture]]")[0]
+    with pytest.raises(NoSolutionError, match="four-bar: no closed posture near this one"):
+        nearest_closed(parse_robot(text), np.full(4, 0.1))
+
+
+@pytest.mark.parametrize("name", ["stewart", "rssr", "bennett"])
+def test_spatial_postures_are_closed_from_nearby_too(name):
+    robot = load_robot(f"linkages/{name}")
+    rough = np.array(robot.posture("home").q) + 0.01 * np.cos(np.arange(len(robot.joints)))
+    q = nearest_closed(robot, rough)
+    posture = replace(robot.posture("home"), q=tuple(q.tolist()))
+    assert sk.closed_mechanism(replace(robot, postures=(posture,))).mobility == COUNTS[name][3]
+
+
+def test_loops_bear_the_names_of_their_closures(mechanisms):
+    assert mechanisms["four-bar"].circuit_names == ("loop",)
+    assert mechanisms["stewart"].circuit_names == tuple(f"loop_1_{i}" for i in range(2, 7))
 
 
 def rssr_angle(p, crank):
