@@ -12,7 +12,7 @@ from pathlib import Path
 
 from screwkin.errors import InputError
 from screwkin.kinematics.positions import screws_in
-from screwkin.model.dh import DHTable, dh_frames, dh_jacobian
+from screwkin.model.dh import Convention, DHTable, dh_frames, dh_jacobian
 from screwkin.model.dh_csv import load_dh
 from screwkin.model.dh_derive import dh_from_screws
 from screwkin.model.robot import Robot
@@ -59,6 +59,22 @@ def chains_of(robot: Robot) -> tuple[Chain, ...]:
     if not chains:
         raise InputError(f"robot {robot.name} has no joints, so there is nothing to compare")
     return tuple(chains)
+
+
+def derived_tables(robot: Robot, convention: Convention) -> tuple[DHTable, ...]:
+    """The table of every chain derived from its screws, in a convention.
+
+    Raises:
+        InputError: no joints, or a helical joint.
+    """
+    return tuple(
+        replace(
+            dh_from_screws(chain.screws, chain.frame, convention, chain.table.joint_names),
+            name=chain.name,
+            tip=chain.table.tip,
+        )
+        for chain in chains_of(replace(robot, path=""))
+    )
 
 
 def support_models(robot: Robot, chains: Sequence[Chain]) -> Mapping[str, tuple[DHTable, ...]]:

@@ -21,6 +21,7 @@ VERBS = {
     "gaits": "List the bundled gaits.",
     "info": "Mass, closed mechanism and conditioning of a robot.",
     "table": "The screw table of a robot; also Markdown, LaTeX and symbolic.",
+    "convert": "Convert a robot between screw tables, URDF and DH tables.",
     "compare": "The screw model of a robot against its Denavit-Hartenberg model.",
     "walk": "Make the trajectory of a gait, with plots and a report.",
     "zmp": "Recompute CoM, ZMP, margins and spikes of a trajectory.",

@@ -66,7 +66,8 @@ def parse_urdf(text: str, path: str = "<text>") -> UrdfRobot:
     left_out = sorted({child.tag for child in root if isinstance(child.tag, str)} - _KEPT)
     if left_out:
         reader.remarks.append(f"left out: {', '.join(left_out)}")
-    bodies, moving = _bodies(reader, base, links, joints)
+    names = _unique_names(reader, links)
+    bodies, moving = _bodies(reader, base, links, joints, names)
     rows = [_joint(reader, edge, pose, parent, child) for edge, pose, parent, child in moving]
     parts = [_link(body) for body in bodies]
     robot = Robot(
@@ -74,7 +75,7 @@ def parse_urdf(text: str, path: str = "<text>") -> UrdfRobot:
         description="",
         source=f"URDF {Path(path).name}",
         base="fixed" if base == "world" else "floating",
-        base_link=_name(base),
+        base_link=names[base],
         links=tuple(parts),
         joints=tuple(rows),
     )
@@ -95,10 +96,13 @@ class _Body:
 
 
 def _bodies(
-    reader: Reader, base: str, links: Mapping[str, Element], joints: Sequence[Edge]
+    reader: Reader,
+    base: str,
+    links: Mapping[str, Element],
+    joints: Sequence[Edge],
+    names: Mapping[str, str],
 ) -> tuple[list[_Body], list[tuple[Edge, Pose, str, str]]]:
     """Bodies in the order of the file, and moving joints with their pose and the bodies that they connect."""
-    names = _unique_names(reader, links)
     pose, body = {base: IDENTITY}, {base: _Body(names[base], IDENTITY)}
     moving, left = [], list(joints)
     while left:

@@ -125,6 +125,11 @@ def test_the_base_is_fixed_where_the_root_is_the_world():
     assert (fixed.base, fixed.base_link) == ("fixed", "world")
 
 
+def test_links_whose_names_a_table_forbids_get_names_of_their_own():
+    robot = parse_urdf(ARM.replace('"base"', '"a b"').replace('"upper"', '"a_b"')).robot
+    assert (robot.base_link, robot.link_names) == ("a_b", ("a_b", "a_b_"))
+
+
 def test_what_cannot_be_kept_is_told():
     shapes = """
       <collision><origin rpy="0 0 1.5707963267948966"/><geometry><box size="1 2 3"/></geometry></collision>

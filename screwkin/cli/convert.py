@@ -1,0 +1,86 @@
+"""``screwkin convert``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from screwkin.analysis.chains import derived_tables
+from screwkin.cli.options import AsJson
+from screwkin.cli.output import print_json, remark
+from screwkin.errors import InputError, UnknownNameError
+from screwkin.files import atomic_write
+from screwkin.model.dh import CONVENTIONS, Convention
+from screwkin.model.dh_csv import dh_text, load_dh
+from screwkin.model.dh_robot import robot_from_dh
+from screwkin.model.robot import Robot
+from screwkin.model.table import load_robot
+from screwkin.model.toml_out import robot_toml
+from screwkin.model.urdf import urdf_from_robot
+from screwkin.model.urdf_in import load_urdf
+
+FORMATS = (".toml", ".urdf", ".csv")
+
+
+def convert(
+    source: Annotated[
+        str, typer.Argument(metavar="IN", help="A bundled robot's name, or a .toml, .urdf or DH .csv file.")
+    ],
+    target: Annotated[Path, typer.Argument(metavar="OUT", help="The .toml, .urdf or DH .csv file to write.")],
+    convention: Annotated[
+        str, typer.Option(metavar="NAME", help="Of a DH file to write: modified or standard.")
+    ] = "modified",
+    as_json: AsJson = False,
+) -> int:
+    """Convert a robot between screw tables (.toml), URDF (.urdf) and Denavit-Hartenberg tables (.csv).
+
+    What the target cannot hold is told. Formulas and mirrored limbs are written out.
+    """
+    chosen = next((known for known in CONVENTIONS if known == convention), None)
+    if chosen is None:
+        raise UnknownNameError("convention", convention, CONVENTIONS)
+    if target.suffix not in FORMATS:
+        raise InputError(f"cannot write {target}: OUT must end with {', '.join(FORMATS)}")
+    robot, remarks = _read(source)
+    text, lost = _written(robot, target.suffix, chosen)
+    with atomic_write(target) as file:
+        file.write(text)
+    remarks += lost
+    if as_json:
+        told = {"robot": robot.name, "file": str(target), "joints": robot.joint_names, "remarks": remarks}
+        print_json(told)
+    else:
+        print(f"{target}: {robot.name}, {len(robot.links)} links, {len(robot.joints)} joints")
+        for text in remarks:
+            remark(text)
+    return 0
+
+
+def _read(source: str) -> tuple[Robot, list[str]]:
+    """The robot of a name or file, and remarks on what its format leaves open."""
+    suffix = Path(source).suffix
+    if suffix == ".urdf":
+        read = load_urdf(source)
+        return read.robot, list(read.remarks)
+    if suffix == ".csv":
+        robot = robot_from_dh(load_dh(source), Path(source).stem, source)
+        return robot, ["DH tables tell no masses, limits and soles: add those that the robot has"]
+    return load_robot(source), []
+
+
+def _written(robot: Robot, suffix: str, convention: Convention) -> tuple[str, list[str]]:
+    """The text of a robot in a format, and remarks on what is lost."""
+    writers: Mapping[str, Callable[[], str]] = {
+        ".toml": lambda: robot_toml(robot),
+        ".urdf": lambda: urdf_from_robot(robot),
+        ".csv": lambda: dh_text(derived_tables(robot, convention)),
+    }
+    lost = {
+        ".toml": [],
+        ".urdf": ["URDF holds no limbs, soles, postures and servos"] if robot.limbs else [],
+        ".csv": ["DH tables hold the chains' geometry only: no masses, limits, soles and closures"],
+    }
+    return writers[suffix](), lost[suffix]

@@ -1,0 +1,74 @@
+"""``convert``: any of the three formats into any other, with a word on what is lost."""
+
+import numpy as np
+import pytest
+
+from screwkin.kinematics.positions import link_displacements
+from screwkin.model.dh_csv import load_dh
+from screwkin.model.table import load_robot
+from screwkin.model.urdf_in import load_urdf
+from screwkin.se3 import as_array
+from tests.model.chains import fk_by_matrices
+
+
+def displacement(robot, q):
+    """Displacement of the right foot's link, whatever it is called."""
+    displaced = link_displacements(robot, [q[name] for name in robot.joint_names])
+    child = robot.joint("right_ankle_roll").child
+    return as_array(displaced[robot.link_names.index(child)])
+
+
+@pytest.mark.parametrize("first", [".toml", ".urdf", ".csv"])
+@pytest.mark.parametrize("second", [".toml", ".urdf", ".csv"])
+def test_motion_survives_every_pair_of_formats(cli, tmp_path, first, second):
+    robot = load_robot("poppy12")
+    assert cli("convert", "poppy12", f"one{first}").code == 0
+    assert cli("convert", f"./one{first}", f"two{second}").code == 0
+    path = tmp_path / f"two{second}"
+    q = dict(zip(robot.joint_names, np.random.default_rng(1).uniform(-3, 3, 12), strict=True))
+    if second == ".csv":  # where the tip is at home does not matter to its displacement
+        (table,) = (t for t in load_dh(path) if "right_ankle_roll" in t.joint_names)
+        values = np.array([q[name] for name in table.joint_names])
+        found = fk_by_matrices(table, values) @ np.linalg.inv(fk_by_matrices(table, 0 * values))
+    else:
+        found = displacement(load_robot(path) if second == ".toml" else load_urdf(path).robot, q)
+    np.testing.assert_allclose(found, displacement(robot, q), rtol=0, atol=1e-14)
+
+
+def test_a_table_written_out_is_the_same_robot_in_numbers(cli, tmp_path):
+    called = cli("convert", "bioloid", "flat.toml", "--json")
+    assert called.data["remarks"] == []
+    flat, robot = load_robot(tmp_path / "flat.toml"), load_robot("bioloid")
+    assert flat.joint_names == robot.joint_names
+    assert flat.mass == robot.mass
+    assert [p.q for p in flat.postures] == [p.q for p in robot.postures]
+
+
+@pytest.mark.parametrize("convention", ["standard", "modified"])
+def test_the_convention_of_a_dh_file_can_be_chosen(cli, tmp_path, convention):
+    called = cli("convert", "bioloid", "legs.csv", "--convention", convention)
+    assert called.code == 0
+    assert "DH tables hold the chains' geometry only" in called.err
+    tables = load_dh(tmp_path / "legs.csv")
+    assert {table.convention for table in tables} == {convention}
+    assert [table.tip for table in tables] == list(load_robot("bioloid").tip_names)
+
+
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["poppy12", "out.xml"], "OUT must end with .toml, .urdf, .csv"),
+        (
+            ["poppy12", "out.csv", "--convention", "craig"],
+            "unknown convention 'craig'; valid: standard, modified",
+        ),
+        (["linkages/four-bar", "out.urdf"], "URDF has no closed loops"),
+        (["none.urdf", "out.toml"], "cannot be read"),
+        (["none.csv", "out.toml"], "cannot be read"),
+        (["nobody", "out.toml"], "unknown robot 'nobody'"),
+        (["poppy12", "no/such/folder/out.toml"], "no/such/folder"),
+    ],
+)
+def test_bad_input_is_told_once_and_writes_nothing(cli, refused, tmp_path, words, named):
+    assert named in refused(cli("convert", *words), 2)
+    assert not list(tmp_path.iterdir())
