@@ -45,7 +45,8 @@ class Deflection:
             to first order for the linear method.
         residual: (B,) what lacks to equilibrium, norm of theta + gravity torque / k.
         iterations: (B,) Newton steps; 0 for the linear method.
-        stable: (B,) bool: springs and weight together resist every further deflection.
+        stable: (B,) bool: springs and weight together resist every further deflection; for the linear method
+            as they do at the commanded posture.
     """
 
     frames: tuple[str, ...]
@@ -121,13 +122,15 @@ def static_deflection(
         torque, hessian = _gravity(here, len(samples), gravity)
         return -(theta + torque / k), np.eye(len(k)) + hessian / k[:, None]
 
+    everyone = np.arange(len(q))
     theta, iterations = np.zeros_like(q), np.zeros(len(q), dtype=int)
     if method == "nonlinear":
         found = newton(balance, theta, tolerance=SETTLED / 10)
         theta, iterations = found.x, found.iterations
+        lack, slope = balance(theta, everyone)
     else:
-        theta = balance(theta, np.arange(len(q)))[0]
-    lack, slope = balance(theta, np.arange(len(q)))
+        theta, slope = balance(theta, everyone)
+        lack, _ = balance(theta, everyone)
     base, change = _yielded(robot, support, stand, q, theta, method)
     return Deflection(
         ("base", *robot.tip_names),
