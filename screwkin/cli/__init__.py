@@ -26,6 +26,8 @@ VERBS = {
     "walk": "Make the trajectory of a gait, with plots and a report.",
     "zmp": "Recompute CoM, ZMP, margins and spikes of a trajectory.",
     "validate": "Simulate a trajectory and give a verdict.",
+    "workspace": "Where a foot can go, held level, and which joint limit cuts there.",
+    "stiffness": "How far a foot yields on elastic joints, all over its workspace.",
 }
 
 _INTERRUPTED = 130

@@ -1,0 +1,116 @@
+"""``screwkin stiffness``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from screwkin.analysis.map_arrays import deflection_arrays
+from screwkin.analysis.stiffness_maps import DeflectionMap, stiffness_maps
+from screwkin.cli.folder import output_folder
+from screwkin.cli.options import AsJson, OutputFolder, RobotName
+from screwkin.cli.output import aligned, print_json, progress_bar
+from screwkin.cli.workspace import Heights, LimbName, Pictures, Resolution, reached_maps
+from screwkin.dynamics.springs import joint_stiffness
+from screwkin.dynamics.stiffness import Method
+from screwkin.files import atomic_write_bytes, npz_bytes
+from screwkin.model.robot import Robot
+from screwkin.model.table import load_robot
+
+
+def stiffness(
+    robot: RobotName,
+    limb: LimbName = None,
+    heights: Heights = None,
+    resolution: Resolution = 0.0025,
+    k: Annotated[
+        float | None,
+        typer.Option("-k", "--stiffness", help="Of every joint [N m/rad]; default: the table's."),
+    ] = None,
+    nonlinear: Annotated[
+        bool, typer.Option("--nonlinear", help="The equilibrium of springs and weight, not its first order.")
+    ] = False,
+    support: Annotated[
+        str | None, typer.Option(help="The tip that stands still; default: the other leg's.")
+    ] = None,
+    posture: Annotated[
+        str | None, typer.Option(help="Of all other joints, by name; default: all zero.")
+    ] = None,
+    plots: Pictures = True,
+    output: OutputFolder = None,
+    as_json: AsJson = False,
+) -> int:
+    """How far a swinging foot yields under the robot's weight, all over its workspace, in single support.
+
+    Files: stiffness.npz and pictures, one of all heights and one for each. For maps at unit stiffness give
+    --stiffness 1.
+    """
+    table = load_robot(robot)
+    joint_stiffness(table, k)  # refused before the workspace is computed
+    method: Method = "nonlinear" if nonlinear else "linear"
+    with output_folder(output, "stiffness", table.name) as folder:
+        places = reached_maps(table, limb, heights, resolution)
+        with progress_bar("deflections") as done:
+            maps = stiffness_maps(table, places, k, method, support, posture, done)
+        with atomic_write_bytes(folder / "stiffness.npz") as file:
+            file.write(npz_bytes(deflection_arrays(maps)))
+        if plots:
+            _draw(table, maps, folder)
+    if as_json:
+        print_json({**stiffness_data(table, maps), "folder": str(folder)})
+    else:
+        print(f"{table.name} on its {maps[0].support}: deflection of the {places[0].tip} ({method})")
+        print(aligned(_rows(maps), "  "))
+        print(f"files in {folder}")
+    return 0
+
+
+def stiffness_data(robot: Robot, maps: Sequence[DeflectionMap]) -> dict[str, Any]:
+    """Areas [cm^2], median and largest deflections [mm] as JSON data; at unit stiffness if all are alike."""
+    rows = [{"height": one.place.height, "area_cm2": 1e4 * one.place.area, **one.summary()} for one in maps]
+    return {
+        "robot": robot.name,
+        "limb": maps[0].place.limb,
+        "support": maps[0].support,
+        "method": maps[0].method,
+        "stiffness": dict(zip(robot.joint_names, maps[0].stiffness.tolist(), strict=True)),
+        "resolution": maps[0].place.resolution,
+        "heights": [row["height"] for row in rows],
+        "areas": [row["area_cm2"] for row in rows],
+        "medians": [row["median_mm"] for row in rows],
+        "deflections": [row["max_mm"] for row in rows],
+        "rows": rows,
+    }
+
+
+def _rows(maps: Sequence[DeflectionMap]) -> list[tuple[str, ...]]:
+    rows: list[tuple[str, ...]] = [("height", "area", "median", "largest", "x", "y", "z")]
+    for one in maps:
+        told = one.summary()
+        rows.append(
+            (
+                f"{1e3 * one.place.height:g} mm",
+                f"{1e4 * one.place.area:.1f} cm²",
+                f"{told['median_mm']:.2f} mm",
+                f"{told['max_mm']:.2f} mm",
+                *(f"{told[f'{axis}_mm'][0]:.2f} to {told[f'{axis}_mm'][1]:.2f} mm" for axis in "xyz"),
+            )
+        )
+    return rows
+
+
+def _draw(robot: Robot, maps: Sequence[DeflectionMap], folder: Path) -> None:
+    from screwkin.report.maps import deflection_overview, deflection_picture
+    from screwkin.report.style import save_figure, styled
+
+    with progress_bar("pictures") as done, styled():
+        save_figure(deflection_overview(robot, maps), folder / "stiffness.png")
+        for count, one in enumerate(maps):
+            if np.isfinite(one.magnitude).any():
+                figure = deflection_picture(robot, one)
+                save_figure(figure, folder / f"stiffness_{1e3 * one.place.height:g}mm.png")
+            done((count + 1) / len(maps))
