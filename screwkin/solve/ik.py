@@ -25,6 +25,10 @@ Numeric = Literal["newton", "lm", "dls", "pinv"]
 Method = Literal["auto", "closed", "hybrid", "newton", "lm", "dls", "pinv"]
 
 
+CUT = 1e-15
+"""Singular values below this share of the largest are dropped by the pseudoinverse: hardly any is."""
+
+
 @dataclass(frozen=True)
 class IkSettings:
     """What a numeric method leaves open.
@@ -97,6 +101,28 @@ def solve_limb(
     )
 
 
+def closed_positions(chain: Chain, target: Array, guess: Array) -> tuple[Array, Array]:
+    """The exact branch nearest to a guess: for whole-body solvers, in place of or before their iterations.
+
+    Args:
+        chain: a limb with a closed form.
+        target: tip poses (B, 4, 4) in the base frame.
+        guess: (B, n).
+
+    Returns:
+        q (B, n), the guess itself where there is no solution; solved (B,) bool. Limits are not asked, so that
+        a limb which moves steadily keeps its branch.
+
+    Raises:
+        InputError: the limb has no closed form.
+    """
+    q, _, valid = solve_closed(closed_form(chain), target, guess, least_squares=False)
+    apart = np.where(valid, np.linalg.norm(np.sin((q - guess[:, None]) / 2), axis=-1), np.inf)
+    best = np.take_along_axis(q, apart.argmin(axis=1)[:, None, None], axis=1)[:, 0]
+    solved = valid.any(axis=1)
+    return np.where(solved[:, None], best, guess), solved
+
+
 def _has_closed_form(chain: Chain) -> bool:
     try:
         closed_form(chain)
@@ -130,7 +156,7 @@ def _iterated(
 
 def _pinv(chain: Chain, target: Array, q: Array, settings: IkSettings) -> tuple[Array, Array]:
     def step(J: Array, lack: Array) -> Array:
-        return settings.gain * (np.linalg.pinv(J) @ lack[..., None])[..., 0]
+        return settings.gain * (np.linalg.pinv(J, rcond=CUT) @ lack[..., None])[..., 0]
 
     return _iterated(chain, target, q, settings, step)
 
