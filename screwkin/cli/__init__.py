@@ -23,6 +23,7 @@ VERBS = {
     "table": "The screw table of a robot; also Markdown, LaTeX and symbolic.",
     "convert": "Convert a robot between screw tables, URDF and DH tables.",
     "compare": "The screw model of a robot against its Denavit-Hartenberg model.",
+    "ik": "Inverse kinematics methods compared on a limb: iterations, coverage, time.",
     "walk": "Make the trajectory of a gait, with plots and a report.",
     "zmp": "Recompute CoM, ZMP, margins and spikes of a trajectory.",
     "validate": "Simulate a trajectory and give a verdict.",
