@@ -244,7 +244,7 @@ def _legend(figure: Figure, areas: Mapping[str, float], colours: Mapping[str, st
     ]
     entries.append(Patch(facecolor=BEYOND, edgecolor="#777777", linewidth=0.5, label="too far for the limb"))
     entries.append(
-        Line2D([], [], color="#222222", linewidth=0.9, label="sole in the zero pose (other leg: dotted)")
+        Line2D([], [], color="#222222", linewidth=0.9, label="soles in the zero pose (dotted: other legs)")
     )
     entries.append(Line2D([], [], color="#222222", marker="+", linestyle="none", label="middle of the waist"))
     figure.legend(handles=entries, loc="outside lower center", ncols=columns, fontsize=7.5)

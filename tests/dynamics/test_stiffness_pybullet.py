@@ -89,7 +89,7 @@ def rest_of_springs(client: int, robot: Robot, state: sk.State, foot: str, k, fo
     ],
 )
 def test_springs_in_a_simulator_come_to_rest_at_the_equilibrium(client, tmp_path, foot, k, lift):
-    """The last case is soft: linear deflections are off there by more than a hundred times the bound."""
+    """Linear deflections are off by a thousand times the bound; the last case is soft."""
     robot = sk.load_robot("poppy12").with_inertia_floor(mass=1e-6, inertia=5e-3)
     home = sk.home(robot)
     pose = np.radians([6, 10, -lift, 30, -8, 5, -5, -7, lift / 2, 10, 4, 3])
@@ -100,7 +100,7 @@ def test_springs_in_a_simulator_come_to_rest_at_the_equilibrium(client, tmp_path
     ours = static_deflection(robot, state, foot, by_name)
     ours.raise_on_failure()
     theirs = rest_of_springs(client, robot, state, foot, k, tmp_path)
-    np.testing.assert_allclose(ours.theta, theirs, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(ours.theta, theirs, rtol=0, atol=1e-7)
     linear = static_deflection(robot, state, foot, by_name, "linear")
-    assert np.abs(linear.theta - theirs).max() > 1e-5
+    assert np.abs(linear.theta - theirs).max() > 1e-4
     assert np.abs(theirs).max() > 0.005
