@@ -1,0 +1,268 @@
+"""Compensation of elastic servos: commands that make a yielding robot go where the plan has it.
+
+A servo told q stands at q + theta, bent by the weight that it carries (``dynamics/stiffness.py``). Two
+remedies, both computed from statics before the walk:
+
+- ``swing``, the published one: while one foot bears, what the other foot would miss its target by is
+  subtracted from the target, and the leg's joints follow by inverse kinematics. The robot still sinks and
+  leans; only the foot in the air is put right.
+- ``joint``: every joint is told q - theta. Posture and both feet are put right. While both feet bear, the
+  deflections of standing on either are blended by the share of the load, so that no command jumps.
+
+Source: paper B, section 5, algorithm of four steps (``swing``); docs/papers.md.
+"""
+
+from __future__ import annotations
+
+import numbers
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from screwkin.dynamics.springs import StiffnessChoice, joint_stiffness
+from screwkin.dynamics.stiffness import Deflection, static_deflection
+from screwkin.dynamics.stiffness import Method as Model
+from screwkin.errors import InputError, LimitError, NoSolutionError
+from screwkin.gait.loads import load_shares
+from screwkin.kinematics.positions import frame_pose, link_displacements
+from screwkin.model.robot import Robot
+from screwkin.model.state import State
+from screwkin.se3 import as_array, pose_from_array, unstack
+from screwkin.solve.pose import solve_pose
+from screwkin.trajectory import Trajectory
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+Method = Literal["swing", "joint"]
+
+METHODS: tuple[Method, ...] = ("swing", "joint")
+MODELS: tuple[Model, ...] = ("linear", "nonlinear")
+LIMIT_SLACK = 1e-9
+"""How far rounding may take a joint beyond its limits [rad or m]."""
+
+
+def compensate(
+    robot: Robot,
+    trajectory: Trajectory,
+    stiffness: StiffnessChoice = None,
+    method: Method = "joint",
+    passes: int = 1,
+    model: Model = "nonlinear",
+) -> Trajectory:
+    """The trajectory with commands that allow for the servos' deflection under the robot's weight.
+
+    Args:
+        robot: of which the trajectory speaks.
+        trajectory: what the robot is to do.
+        stiffness: of the joints, see ``joint_stiffness``.
+        method: ``swing`` moves the target of the foot in the air; ``joint`` commands q - theta.
+        passes: how often what is still missing is predicted and subtracted.
+        model: how deflections are predicted. For ``joint``, ``linear`` takes the torques of the intended
+            posture; the compensated robot stands in it, so that the first pass is exact already.
+
+    Returns:
+        Trajectory with the commanded ``q`` and ``qd``; all other fields stay those of the intended motion.
+        ``meta["compensation"]`` tells how it was made.
+
+    Raises:
+        NoSolutionError: the joints are too soft for the robot's weight. UnreachableError, SingularError,
+        LimitError: a compensated target or joint is out of reach. InputError: a choice is wrong, or the
+        trajectory is not one of this robot's walks.
+    """
+    k = joint_stiffness(robot, stiffness)
+    *_, last = _commands(robot, trajectory, stiffness, method, passes, model)
+    q = trajectory.q + last
+    _check_limits(robot, trajectory, q)
+    told = {
+        "method": method,
+        "model": model,
+        "passes": int(passes),
+        "stiffness": dict(zip(robot.joint_names, k.tolist(), strict=True)),
+    }
+    qd = trajectory.qd + _rates(trajectory.time, last)
+    return replace(trajectory, q=q, qd=qd, meta={**trajectory.meta, "compensation": told})
+
+
+@dataclass(frozen=True)
+class Remaining:
+    """Position error of the foot in the air after so many passes, against the nonlinear equilibrium.
+
+    largest_mm: of |x|, |y|, |z| over the walk; norm_mm: largest distance; removed: share of the norm that the
+    passes took away.
+    """
+
+    passes: int
+    largest_mm: tuple[float, float, float]
+    norm_mm: float
+    removed: float
+
+
+def convergence(
+    robot: Robot,
+    trajectory: Trajectory,
+    stiffness: StiffnessChoice = None,
+    passes: int = 5,
+    method: Method = "swing",
+    model: Model = "nonlinear",
+) -> tuple[Remaining, ...]:
+    """What every pass of a compensation leaves of the swing foot's position error; row 0 is without any.
+
+    Arguments and errors as of ``compensate``. The error is measured while one foot bears: the place of the
+    other foot's tip in the nonlinear equilibrium, against the intended one, with the bearing foot in place.
+    """
+    rows: list[Remaining] = []
+    for change in _commands(robot, trajectory, stiffness, method, passes, model):
+        missed = 1e3 * _swing_errors(robot, trajectory, trajectory.q + change, stiffness, "nonlinear")
+        x, y, z = np.abs(missed).max(axis=(0, 1)).tolist()
+        norm = float(np.linalg.norm(missed, axis=-1).max())
+        first = rows[0].norm_mm if rows else norm
+        rows.append(Remaining(len(rows), (x, y, z), norm, 1.0 - norm / first if first else 0.0))
+    return tuple(rows)
+
+
+def _commands(
+    robot: Robot,
+    trajectory: Trajectory,
+    stiffness: StiffnessChoice,
+    method: Method,
+    passes: int,
+    model: Model,
+) -> Iterator[Array]:
+    """What is added to the joint positions (T, n): nothing, then after each pass."""
+    _check_choices(method, passes, model)
+    _check_fit(robot, trajectory)
+    shares = load_shares(trajectory)
+    change = np.zeros_like(trajectory.q)
+    yield change
+    shifts = np.zeros((trajectory.samples, len(trajectory.feet), 3))
+    for _ in range(passes):
+        if method == "joint":
+            at = trajectory.q if model == "linear" else trajectory.q + change
+            change = -_blended_deflection(robot, trajectory, shares, at, stiffness, model)
+        else:
+            missed = _swing_errors(robot, trajectory, trajectory.q + change, stiffness, model)
+            shifts = shifts - missed
+            change = _reached(robot, trajectory, shifts, trajectory.q + change) - trajectory.q
+        yield change
+
+
+def _blended_deflection(
+    robot: Robot, trajectory: Trajectory, shares: Array, q: Array, stiffness: StiffnessChoice, model: Model
+) -> Array:
+    """Deflections (T, n) of standing on either foot, weighted by its share (T, 2) of the load."""
+    theta = np.zeros_like(q)
+    for i, share in enumerate(shares.T):
+        rows = np.flatnonzero(share > 0)
+        yielded = _deflected(robot, trajectory, q, i, rows, stiffness, model)
+        theta[rows] += share[rows, None] * yielded.theta
+    return theta
+
+
+def _swing_errors(
+    robot: Robot, trajectory: Trajectory, q: Array, stiffness: StiffnessChoice, model: Model
+) -> Array:
+    """Where feet in the air are, less where they should be, (T, feet, 3) [m]; 0 for feet that bear."""
+    missed = np.zeros((trajectory.samples, len(trajectory.feet), 3))
+    alone = trajectory.contact.sum(axis=1) == 1
+    for i in range(len(trajectory.feet)):
+        rows = np.flatnonzero(alone & trajectory.contact[:, i])
+        if not len(rows):
+            continue
+        yielded = _deflected(robot, trajectory, q, i, rows, stiffness, model)
+        for j, foot in enumerate(trajectory.feet):
+            if j != i:
+                wanted = trajectory.T_world_tip[foot][rows, :3, 3]
+                missed[rows, j] = yielded.before[foot] + yielded.of(foot) - wanted
+    return missed
+
+
+@dataclass(frozen=True, eq=False)
+class _Yielded:
+    """Deflections theta (B, n), and where the feet are before, and by how much they move, (B, 3) [m]."""
+
+    theta: Array
+    before: dict[str, Array]
+    change: Deflection
+
+    def of(self, foot: str) -> Array:
+        return np.asarray(self.change.of(foot)[:, 3:])
+
+
+def _deflected(
+    robot: Robot,
+    trajectory: Trajectory,
+    q: Array,
+    foot: int,
+    rows: NDArray[np.intp],
+    stiffness: StiffnessChoice,
+    model: Model,
+) -> _Yielded:
+    """The robot commanded q[rows] (B, n) on one foot, which stands where the trajectory has it."""
+    D = link_displacements(robot, unstack(q[rows]))
+    feet = {name: frame_pose(robot, D, name) for name in trajectory.feet}
+    stands = trajectory.feet[foot]
+    base = pose_from_array(trajectory.T_world_tip[stands][rows]) @ feet[stands].inverse
+    batch = (len(rows),)
+    found = static_deflection(robot, State(as_array(base, batch), q[rows]), stands, stiffness, model)
+    bad = rows[~(found.converged & found.stable)]
+    if len(bad):
+        raise NoSolutionError(
+            f"t = {trajectory.time[bad[0]]:.3f} s: standing on {stands} the joints are too soft for the "
+            f"robot's weight: no stable equilibrium in {len(bad)} of {len(rows)} samples. Raise the stiffness"
+        )
+    places = {name: as_array((base @ pose).p, batch) for name, pose in feet.items()}
+    return _Yielded(np.asarray(found.theta), places, found)
+
+
+def _reached(robot: Robot, trajectory: Trajectory, shifts: Array, guess: Array) -> Array:
+    """Joint positions (T, n) with the base in place and the feet beside theirs by (T, feet, 3)."""
+    targets: dict[str, Array] = {"base": trajectory.T_world_base}
+    for i, foot in enumerate(trajectory.feet):
+        targets[foot] = trajectory.T_world_tip[foot].copy()
+        targets[foot][:, :3, 3] += shifts[:, i]
+    solution = solve_pose(robot, targets, State(trajectory.T_world_base, guess))
+    solution.raise_on_failure(robot, trajectory.time)
+    moved = (shifts != 0).any(axis=(1, 2))[:, None]
+    return np.where(moved, solution.state.q, guess)
+
+
+def _rates(time: Array, change: Array) -> Array:
+    """Rates (T, n) of a change of the joint positions that overshoots nowhere, though it jumps at liftoff."""
+    from scipy.interpolate import PchipInterpolator
+
+    return np.asarray(PchipInterpolator(time, change, axis=0).derivative()(time))
+
+
+def _check_limits(robot: Robot, trajectory: Trajectory, q: Array) -> None:
+    lower = np.array([joint.lower for joint in robot.joints])
+    upper = np.array([joint.upper for joint in robot.joints])
+    beyond = np.maximum(lower - q, q - upper)
+    if beyond.max() > LIMIT_SLACK:
+        row, i = (int(x) for x in np.unravel_index(np.argmax(beyond), beyond.shape))
+        factor, unit = (1e3, "mm") if robot.joints[i].type == "prismatic" else (180 / np.pi, "deg")
+        raise LimitError(
+            f"t = {trajectory.time[row]:.3f} s: {robot.joints[i].name} is compensated to "
+            f"{factor * q[row, i]:.1f} {unit}, beyond its limits {factor * lower[i]:.1f} to "
+            f"{factor * upper[i]:.1f} {unit}; bend the leg less in the gait, or raise the stiffness"
+        )
+
+
+def _check_choices(method: str, passes: object, model: str) -> None:
+    for what, chosen, valid in (("method", method, METHODS), ("model", model, MODELS)):
+        if chosen not in valid:
+            raise InputError(f"unknown {what} {chosen!r} of compensation; valid: {', '.join(valid)}")
+    if isinstance(passes, bool) or not isinstance(passes, numbers.Integral) or passes < 1:
+        raise InputError(f"passes is {passes!r}; it must be a whole number of at least 1")
+
+
+def _check_fit(robot: Robot, trajectory: Trajectory) -> None:
+    if trajectory.joint_names != robot.joint_names:
+        strange = sorted(set(trajectory.joint_names) ^ set(robot.joint_names))
+        raise InputError(
+            f"the trajectory's joints are not those of {robot.name}: {', '.join(strange) or 'other order'}"
+        )
+    strange = [foot for foot in trajectory.feet if foot not in robot.tip_names]
+    if strange:
+        raise InputError(f"the trajectory's feet {', '.join(strange)} are no tips of {robot.name}")

@@ -1,0 +1,58 @@
+"""How feet share the robot's weight along a trajectory."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from screwkin.errors import InputError
+from screwkin.trajectory import Trajectory
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+TELLING = 0.1
+"""Least way of the ZMP from foot to foot, as a share of their distance, that tells how the load moves."""
+
+
+def load_shares(trajectory: Trajectory) -> Array:
+    """Share of the weight that either foot bears, (T, 2), continuous in time; rows add up to 1.
+
+    A foot that bears alone bears all. Between, the share goes with the planned ZMP's way from one sole to the
+    other, stretched so that it starts and ends where the neighbouring single supports are; where the ZMP does
+    not tell (the same foot before and after), evenly in time.
+
+    Raises:
+        InputError: other than two feet, or a sample in which none bears.
+    """
+    if len(trajectory.feet) != 2:
+        raise InputError(f"the trajectory has {len(trajectory.feet)} feet; loads are shared between two")
+    flying = np.flatnonzero(~trajectory.contact.any(axis=1))
+    if len(flying):
+        raise InputError(f"t = {trajectory.time[flying[0]]:.3f} s: no foot bears, and none carries a load")
+    first = np.where(trajectory.contact[:, 0], 1.0, 0.0)
+    both = np.asarray(trajectory.contact.all(axis=1))
+    raw = _towards_first(trajectory)
+    for start, end in _stretches(both):
+        before = first[start - 1] if start > 0 else raw[start]
+        after = first[end] if end < len(first) else raw[end - 1]
+        way, span = raw[start:end] - raw[start], raw[end - 1] - raw[start]
+        along = way / span if abs(span) > TELLING else np.linspace(0.0, 1.0, end - start)
+        first[start:end] = np.clip(before + (after - before) * along, 0.0, 1.0)
+    return np.stack([first, 1.0 - first], axis=1)
+
+
+def _towards_first(trajectory: Trajectory) -> Array:
+    """Place of the ZMP on the line from the second foot (0) to the first one (1), (T,)."""
+    a, b = (trajectory.T_world_tip[foot][:, :2, 3] for foot in trajectory.feet)
+    line = a - b
+    length = np.maximum((line**2).sum(axis=1), 1e-12)
+    return np.clip(((trajectory.zmp - b) * line).sum(axis=1) / length, 0.0, 1.0)
+
+
+def _stretches(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and one-past-last index of every run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
