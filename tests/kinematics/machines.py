@@ -11,7 +11,7 @@ from screwkin.kinematics.positions import link_displacements
 from screwkin.model.robot import Closure, Inertia, Joint, Limb, Link, Posture, Robot
 from screwkin.model.state import State
 from screwkin.screw import INFINITE, Screw
-from screwkin.se3 import IDENTITY, Pose, Rotation, Twist, Vector, exp, vector_from_array
+from screwkin.se3 import IDENTITY, Pose, Rotation, Twist, Vector, X, Z, exp, rotate, vector_from_array
 
 TYPES = ("revolute", "revolute", "revolute", "prismatic", "helical")
 SPATIAL = ("px", "py", "pz", "rx", "ry", "rz")
@@ -137,7 +137,7 @@ def random_mechanism(seed: int) -> Robot:
 
 
 def planar_arm(height: float = 0.1, chain: tuple[str, ...] = ("px", "py", "rz")) -> Robot:
-    """Three links of 0.3 m about vertical axes at some height; the hand's frame stands askew."""
+    """Three links of 0.3 m with vertical axes at a height; the hand's frame is yawed by 0.25 and rolled."""
     names = ["base", "link_1", "link_2", "link_3"]
     links = [Link(name, 0, Vector(0, 0, 0), Inertia(0, 0, 0), IDENTITY) for name in names]
     rows = [
@@ -147,7 +147,7 @@ def planar_arm(height: float = 0.1, chain: tuple[str, ...] = ("px", "py", "rz"))
         )
         for i in (1, 2, 3)
     ]  # fmt: skip
-    hand = Pose(Rotation(Vector(0, 1, 0), Vector(0, 0, 1), Vector(1, 0, 0)), Vector(0.9, 0.0, height))
+    hand = Pose(rotate(Z, 0.25) @ rotate(X, 1.2), Vector(0.9, 0.0, height))
     limb = Limb("arm", "arm", "link_3", "hand", hand, chain)
     return machine(links, rows, limbs=(limb,), home=(0.4, 0.7, -0.3))
 

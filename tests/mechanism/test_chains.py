@@ -130,15 +130,15 @@ def test_a_planar_chain_imposes_place_and_direction_of_a_planar_arm():
     assert mechanism.couplings == ("joint_1", "joint_2", "joint_3", "hand.px", "hand.py", "hand.rz")
     assert mechanism.primary == ("hand.px", "hand.py", "hand.rz")
     assert (mechanism.mobility, mechanism.kutzbach, len(mechanism.circuits)) == (3, 0, 1)
-    direction = 0.2
-    solution = close_loops(
-        mechanism, sk.home(arm), {"hand.px": 0.5, "hand.py": 0.3, "hand.rz": direction + np.pi / 2}
-    )
+    direction, yaw = 0.2, 0.25
+    wanted = {"hand.px": 0.5, "hand.py": 0.3, "hand.rz": direction + yaw}
+    solution = close_loops(mechanism, sk.home(arm), wanted)
     assert solution.status == Status.CONVERGED
-    # The textbook arm: the wrist 0.3 m behind the hand, then a triangle with two sides of 0.3 m.
-    q = solution.state.q
-    tips = np.cumsum([[0.3 * np.cos(t), 0.3 * np.sin(t)] for t in np.cumsum(q)], axis=0)
-    np.testing.assert_allclose(tips[-1], [0.5, 0.3], atol=1e-12)
+    # The textbook arm: three bars of 0.3 m, the last one in the wanted direction.
+    heading = np.cumsum(solution.state.q)
+    assert heading[-1] == pytest.approx(direction)
+    np.testing.assert_allclose(0.3 * np.cos(heading).sum(), 0.5, atol=1e-12)
+    np.testing.assert_allclose(0.3 * np.sin(heading).sum(), 0.3, atol=1e-12)
     hand = sk.frame_pose(arm, solution.state, "hand")
     np.testing.assert_allclose(hand[:3, 3], [0.5, 0.3, 0.1], atol=1e-12)
 
