@@ -26,7 +26,7 @@ EXACT = 1e-12
 SAME = 1e-6
 """Branches closer than this [rad] are one: what rounding leaves of a double root."""
 BLOCK = 4096
-"""Samples computed together: their intermediate arrays stay in the processor's cache."""
+"""Samples computed together, which bounds the memory of a large batch."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,12 +109,22 @@ def solve_closed(
         root is valid once. Where no branch is valid, the first is the least-squares answer, if wanted, else
         the closed form's branch of least error.
     """
+    guess = np.zeros((len(target), 6)) if guess is None else guess
+    blocks = [slice(i, i + BLOCK) for i in range(0, max(len(target), 1), BLOCK)]
+    parts = [_solved_block(form, target[block], guess[block], least_squares) for block in blocks]
+    q, error, valid = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return q, error, valid
+
+
+def _solved_block(
+    form: ClosedForm, target: Array, guess: Array, least_squares: bool
+) -> tuple[Array, Array, Array]:
+    """The solutions of a few samples, see ``solve_closed``."""
     q, error = _refined(form.chain, form.branches(target), target)
     valid = _first_of_its_kind(q, error) & (error <= EXACT)
     lost = np.flatnonzero(~valid.any(axis=1))
     if len(lost):
-        about = np.zeros((len(q), q.shape[2])) if guess is None else guess
-        best = _likeliest(form.chain, q[lost], error[lost], about[lost])
+        best = _likeliest(form.chain, q[lost], error[lost], guess[lost])
         if least_squares:
             best = form.chain.wrapped(nearest(form.chain, best, target[lost]))
         q[lost, 0] = best

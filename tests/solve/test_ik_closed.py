@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from screwkin.errors import InputError
 from screwkin.model.table import load_robot
+from screwkin.solve import closed
 from screwkin.solve.chain import Chain
 from screwkin.solve.closed import ClosedForm, closed_form, solve_closed
 from screwkin.solve.newton import newton
@@ -272,3 +273,12 @@ def test_an_arm_with_a_spherical_wrist_is_found_by_walking_it_backwards() -> Non
     assert isinstance(form, ClosedForm)
     assert (form.family, form.backwards) == ("spherical hip", True)
     assert_solved(leg_of(chain), chain, angles(91, 500, 2.5))
+
+
+def test_a_batch_larger_than_a_block_is_solved_like_its_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    leg = offset_leg()
+    form, target = closed_form(leg.chain()), leg.reach(angles(101, 70))
+    whole = solve_closed(form, target)
+    monkeypatch.setattr(closed, "BLOCK", 16)
+    for one, other in zip(solve_closed(form, target), whole, strict=True):
+        np.testing.assert_array_equal(one, other)
