@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         mass_matrix,
         momentum,
     )
+    from screwkin.api.ik import limb_ik
     from screwkin.api.mechanism import network_matrix, secondary_rates, solve_pose, virtual_motion
     from screwkin.errors import ScrewkinError
     from screwkin.gait.balance import Balance, zmp
@@ -40,6 +41,7 @@ _HOMES = {
         "center_of_mass com_jacobian frame_pose ground_wrench home inverse_dynamics jacobian link_poses"
         " mass_matrix momentum"
     ),
+    "api.ik": "limb_ik",
     "api.mechanism": "network_matrix secondary_rates solve_pose virtual_motion",
     "errors": "ScrewkinError",
     "gait.balance": "Balance zmp",
@@ -76,6 +78,7 @@ __all__ = [
     "home",
     "inverse_dynamics",
     "jacobian",
+    "limb_ik",
     "link_poses",
     "load_gait",
     "load_robot",
