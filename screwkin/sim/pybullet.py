@@ -38,7 +38,9 @@ class Physics:
     """Settings of the simulation.
 
     dt [s]; iterations of the constraint solver per step; friction between soles and floor; gains of the
-    joints' position control (dimensionless: the share of an error that one step removes); gravity [m/s^2].
+    joints' position control (dimensionless: the share of an error that one step removes); gravity [m/s^2];
+    sole_stiffness [N/m] and sole_damping [N s/m] of every point in which a leg's last link touches the floor,
+    None for rigid soles.
     """
 
     dt: float = 1e-3
@@ -47,6 +49,8 @@ class Physics:
     position_gain: float = 0.5
     velocity_gain: float = 1.0
     gravity: float = 9.81
+    sole_stiffness: float | None = None
+    sole_damping: float = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,11 +74,12 @@ class PyBulletBackend:
 
         Raises:
             MissingDependencyError: pybullet is not installed.
-            InputError: the robot has loops or helical joints, a leg has nothing to stand on, or there is no
-                display for ``gui``.
+            InputError: the robot has loops or helical joints, a leg has nothing to stand on, soles cannot be
+                so elastic, or there is no display for ``gui``.
         """
         self._robot = robot
         self._physics = physics or Physics()
+        _check_soles(self._physics)
         self.dt = self._physics.dt
         _check_feet(robot)
         urdf = urdf_from_robot(robot.with_inertia_floor())
@@ -94,6 +99,7 @@ class PyBulletBackend:
         self._T_base_inertial = self._pose(info[3], info[4])
         self._T_inertial_base = np.linalg.inv(self._T_base_inertial)
         self._feet = [self._foot(limb) for limb in robot.limbs if limb.kind == "leg"]
+        self._soften_soles()
 
     def _make_floor(self) -> int:
         p, here, physics = self._p, self._here, self._physics
@@ -148,6 +154,20 @@ class PyBulletBackend:
             self._body, self._joints, p.VELOCITY_CONTROL, forces=[0.0] * len(self._joints), **here
         )
 
+    def _soften_soles(self) -> None:
+        """Make the points in which feet touch the floor springs, if so wanted."""
+        physics = self._physics
+        if physics.sole_stiffness is None:
+            return
+        for foot in self._feet:
+            self._p.changeDynamics(
+                self._body,
+                foot.index,
+                contactStiffness=physics.sole_stiffness,
+                contactDamping=physics.sole_damping,
+                **self._here,
+            )
+
     def _foot(self, limb: Limb) -> _Foot:
         robot, p = self._robot, self._p
         index = self._link_names.index(limb.link) - 1
@@ -181,7 +201,15 @@ class PyBulletBackend:
         return self.observe()
 
     def step(self, command: Command) -> None:
-        """Let one step pass, every joint under position and velocity control within its effort."""
+        """Let one step pass under a command."""
+        self._drive(command)
+        self._p.stepSimulation(**self._here)
+        self._steps += 1
+        if self._began is not None and self._steps % 20 == 0:
+            self._show(self._began)
+
+    def _drive(self, command: Command) -> None:
+        """Set the motors for one step: every joint under position and velocity control within its effort."""
         p, n = self._p, len(self._joints)
         p.setJointMotorControlArray(
             self._body,
@@ -194,10 +222,6 @@ class PyBulletBackend:
             velocityGains=[self._physics.velocity_gain] * n,
             **self._here,
         )
-        p.stepSimulation(**self._here)
-        self._steps += 1
-        if self._began is not None and self._steps % 20 == 0:
-            self._show(self._began)
 
     def _show(self, began: float) -> None:
         """Keep a window's camera on the robot, and its time no faster than the world's."""
@@ -275,6 +299,14 @@ def _check_feet(robot: Robot) -> None:
             f"robot {robot.name}: {names} has no box, so it would sink into the floor. "
             "Give the link a box whose bottom is the sole."
         )
+
+
+def _check_soles(physics: Physics) -> None:
+    k, d = physics.sole_stiffness, physics.sole_damping
+    if k is not None and not (np.isfinite(k) and k > 0):
+        raise InputError(f"sole_stiffness is {k!r}; it must be a positive number in N/m, or None")
+    if not (np.isfinite(d) and d >= 0):
+        raise InputError(f"sole_damping is {d!r}; it must be a finite number of at least 0 in N s/m")
 
 
 def _cross(a: Array, b: Array) -> Array:
