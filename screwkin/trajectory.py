@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 
 from screwkin.errors import InputError, TrajectoryError
 from screwkin.files import atomic_write, atomic_write_bytes, npz_bytes, read_npz
+from screwkin.model.state import not_rigid
 from screwkin.se3 import as_array, rotation_exp, rotation_from_array, rotation_log
 
 Array = NDArray[np.float64]
 
 TIP_PREFIX = "T_world_"
-_RIGID = 1e-6  # largest deviation from a rotation matrix that rounding and other writers may cause
 _SHAPES: Mapping[str, tuple[str, ...]] = {
     "time": ("T",),
     "q": ("T", "n"),
@@ -272,15 +272,8 @@ def _inconsistencies(trajectory: Trajectory) -> list[str]:
     return faults + [
         f"{TIP_PREFIX}{name} is not a rigid pose in sample {int(np.argmax(bad))}"
         for name, pose in poses.items()
-        if (bad := _not_rigid(pose)).any()
+        if (bad := not_rigid(pose)).any()
     ]
-
-
-def _not_rigid(pose: Array) -> NDArray[np.bool_]:
-    R = pose[:, :3, :3]
-    skewed = np.abs(R @ R.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2)) > _RIGID
-    foreign = np.abs(pose[:, 3] - np.array([0.0, 0.0, 0.0, 1.0])).max(axis=1) > _RIGID
-    return np.asarray(skewed | foreign | (np.linalg.det(R) < 0))
 
 
 def _arrays(trajectory: Trajectory) -> dict[str, NDArray[Any]]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from screwkin.errors import ShapeError
 from screwkin.model.robot import Robot
-from screwkin.model.state import State
+from screwkin.model.state import State, not_rigid
 from screwkin.scalar import is_jax
 from screwkin.se3 import NO_TWIST, Pose, Twist, pose_from_array, twist_from_array, unstack
 
@@ -39,6 +39,21 @@ def checked(name: str, array: Any, *shape: int) -> Array:
     return array
 
 
+def rigid(name: str, T: Array) -> Array:
+    """Checked poses (..., 4, 4) that are rigid displacements; JAX arrays, perhaps traced, are taken as told.
+
+    Raises:
+        ShapeError: a matrix is no rigid displacement.
+    """
+    if not is_jax(T) and (bad := not_rigid(T)).any():
+        sample = tuple(int(i) for i in np.argwhere(bad)[0])
+        raise ShapeError(
+            f"{name} is not a rigid pose{f' in sample {sample}' if sample else ''}: expected an orthonormal, "
+            "right-handed 3 x 3 rotation and the last row 0 0 0 1"
+        )
+    return T
+
+
 def parts(robot: Robot, state: State) -> tuple[Pose, list[Any], tuple[int, ...]]:
     """Base pose, joint scalars and batch shape of a checked state."""
     T = checked("state.T_world_base", state.T_world_base, 4, 4)
@@ -49,7 +64,7 @@ def parts(robot: Robot, state: State) -> tuple[Pose, list[Any], tuple[int, ...]]
         raise ShapeError(
             f"batch of state.T_world_base {T.shape[:-2]} and of state.q {q.shape[:-1]} do not broadcast"
         ) from None
-    return pose_from_array(T), unstack(q), batch
+    return pose_from_array(rigid("state.T_world_base", T)), unstack(q), batch
 
 
 def joint_scalars(robot: Robot, name: str, values: Any) -> list[Any]:

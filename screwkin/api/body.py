@@ -39,7 +39,7 @@ def link_poses(robot: Robot, state: State) -> Array:
         (..., L, 4, 4), in ``robot.link_names`` order; a link's frame is its ``frame`` in the table.
 
     Raises:
-        ShapeError: wrong shape, NaN or infinity.
+        ShapeError: wrong shape, NaN or infinity, or a base pose that is not rigid.
 
     Source: paper A, eq. 2-3.
     """
@@ -107,8 +107,8 @@ def com_jacobian(robot: Robot, state: State) -> Array:
     _check_mass(robot)
     T, q, batch = parts(robot, state)
     turned = Pose(T.R, ZERO)
-    D = [turned @ d for d in positions.link_displacements(robot, q)]
-    twists = positions.joint_twists(robot, positions.link_displacements(robot, q), turned)
+    local = positions.link_displacements(robot, q)
+    D, twists = [turned @ d for d in local], positions.joint_twists(robot, local, turned)
     c = mass.center_of_mass(robot, D)
     spin = [at(c, Twist(e, ZERO)).v for e in (X, Y, Z)]
     return _last_axes_swapped(as_array([*spin, X, Y, Z, *mass.com_jacobian(robot, D, twists)], batch))

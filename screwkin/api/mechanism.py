@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from screwkin.api.arrays import Array, checked, parts, twist_of
+from screwkin.api.arrays import Array, checked, parts, rigid, twist_of
 from screwkin.api.body import home
 from screwkin.errors import InputError, SingularError, UnknownNameError
 from screwkin.mechanism import network
@@ -148,7 +148,8 @@ def solve_pose(
         without solution; ``.raise_on_failure(robot)`` does.
 
     Raises:
-        UnknownNameError: a target is no tip. ShapeError: wrong shape, NaN or infinity.
+        UnknownNameError: a target is no tip. ShapeError: wrong shape, NaN or infinity, or a pose
+            that is not rigid.
     """
     if method not in ("auto", "newton"):
         raise InputError(f"method is {method!r}; valid: auto, newton")
@@ -157,7 +158,8 @@ def solve_pose(
         if name != "base" and name not in robot.tip_names:
             raise UnknownNameError("target", name, ("base", *robot.tip_names))
         pose = np.shape(value)[-2:] == (4, 4) or name == "base"
-        wanted[name] = checked(f"targets[{name!r}]", value, *((4, 4) if pose else (3,)))
+        told = f"targets[{name!r}]"
+        wanted[name] = rigid(told, checked(told, value, 4, 4)) if pose else checked(told, value, 3)
     guess = home(robot) if guess is None else guess
     parts(robot, guess)
     return pose_solver.solve_pose(robot, wanted, State(np.asarray(guess.T_world_base), np.asarray(guess.q)))

@@ -53,6 +53,18 @@ def test_text_is_no_array(robot: sk.Robot) -> None:
         sk.link_poses(robot, sk.State(np.eye(4), ["a"] * 18))
 
 
+@pytest.mark.parametrize(
+    "wrong", [2.0 * np.eye(4), np.diag([1.0, 1.0, -1.0, 1.0]), np.array(np.eye(4)) + np.eye(4, k=-3)]
+)
+def test_a_base_pose_that_is_no_rigid_displacement_is_refused(robot: sk.Robot, wrong: np.ndarray) -> None:
+    """Scaled, mirrored, or told as its own transpose."""
+    with pytest.raises(ShapeError, match=r"state\.T_world_base is not a rigid pose: expected"):
+        sk.link_poses(robot, sk.State(wrong, np.zeros(18)))
+    batch = np.array([np.eye(4), wrong])
+    with pytest.raises(ShapeError, match=r"targets\['left_foot'\] is not a rigid pose in sample \(1,\)"):
+        sk.solve_pose(robot, {"left_foot": batch})
+
+
 def test_batches_that_do_not_fit_are_refused(robot: sk.Robot) -> None:
     with pytest.raises(ShapeError, match="do not broadcast"):
         sk.link_poses(robot, sk.State(np.zeros((3, 4, 4)), np.zeros((5, 18))))
