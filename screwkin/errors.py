@@ -20,7 +20,7 @@ class InputError(ScrewkinError, ValueError):
 
 
 class ShapeError(InputError):
-    """An array has the wrong shape, a wrong dtype, or holds NaN or infinity."""
+    """An array has the wrong shape or dtype, holds NaN or infinity, or is no rigid pose."""
 
 
 class UnknownNameError(InputError, LookupError):
@@ -102,7 +102,11 @@ class SingularError(NoSolutionError):
 
 
 class LimitError(NoSolutionError):
-    """A joint position lies outside its limits."""
+    """A joint position lies outside its limits; ``limb`` and ``sample`` say where."""
+
+    def __init__(self, message: str, limb: str = "", sample: int = -1) -> None:
+        self.limb, self.sample = limb, sample
+        super().__init__(message)
 
 
 class SafetyError(ScrewkinError):

@@ -29,6 +29,7 @@ VERBS = {
     "validate": "Simulate a trajectory and give a verdict.",
     "workspace": "Where a foot can go, held level, and which joint limit cuts there.",
     "stiffness": "How far a foot yields on elastic joints, all over its workspace.",
+    "reproduce": "Every table and figure of a paper, its value beside ours.",
 }
 
 _INTERRUPTED = 130
@@ -128,6 +129,7 @@ def _told(error: Exception, words: Sequence[str], debug: bool) -> int:
     if "--json" in words:
         from screwkin.cli.output import print_json
 
-        facts = {"limb": getattr(error, "limb", None), "sample": getattr(error, "sample", None)}
-        print_json({"error": message, "exit_code": code, **{k: v for k, v in facts.items() if v is not None}})
+        facts = {"limb": getattr(error, "limb", ""), "sample": getattr(error, "sample", -1)}
+        told = {key: value for key, value in facts.items() if value not in ("", -1)}
+        print_json({"error": message, "exit_code": code, **told})
     return code

@@ -104,8 +104,8 @@ def closed_mechanism(robot: Robot, primary: Sequence[str] | None = None) -> Mech
 
     Raises:
         UnknownNameError: a primary name is no coupling.
-        InputError: too few or too many primary couplings, with the ones to move; or a closure that is open at
-            the home posture, where ranks would mean nothing.
+        InputError: a name twice; too few or too many primary couplings, with the ones to move; or a closure
+            that is open at the home posture, where ranks would mean nothing.
         SingularError: the right number, but dependent; says which to exchange.
 
     Source: Davies (1981); paper A, eq. 9-11, 15.
@@ -119,10 +119,7 @@ def closed_mechanism(robot: Robot, primary: Sequence[str] | None = None) -> Mech
     if primary is None:
         columns = set(independent(N, preference(bare)))
         primary = tuple(name for i, name in enumerate(bare.couplings) if i not in columns)
-    for name in primary:
-        if name not in bare.position:
-            raise UnknownNameError("coupling", name, bare.couplings)
-    wanted = set(primary)
+    wanted = _wanted(bare, primary)
     chosen = replace(
         bare,
         primary=tuple(name for name in bare.couplings if name in wanted),
@@ -131,6 +128,20 @@ def closed_mechanism(robot: Robot, primary: Sequence[str] | None = None) -> Mech
     )
     _check(chosen, N)
     return chosen
+
+
+def _wanted(bare: Mechanism, primary: Sequence[str]) -> set[str]:
+    """The names, each of a coupling and given once."""
+    if isinstance(primary, str):
+        raise InputError(f"primary is the text {primary!r}; give a list of couplings, as [{primary!r}]")
+    wanted: set[str] = set()
+    for name in primary:
+        if name not in bare.position:
+            raise UnknownNameError("coupling", name, bare.couplings)
+        if name in wanted:
+            raise InputError(f"primary names {name} twice; give every coupling once")
+        wanted.add(name)
+    return wanted
 
 
 def _check_closed(robot: Robot, q: Sequence[float]) -> None:

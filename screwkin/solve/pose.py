@@ -86,7 +86,8 @@ class PoseSolution:
             raise SingularError(f"{where}: singular; {status.help}{more}", name, sample)
         worst = int(flat["worst_joint"][sample, limb])
         q = float(np.reshape(self.state.q, (-1, len(robot.joints)))[sample, worst])
-        raise LimitError(f"{where}: {_beyond(robot.joints[worst], q)}; {status.help}{more}")
+        told = f"{where}: {_beyond(robot.joints[worst], q)}; {status.help}{more}"
+        raise LimitError(told, name, sample)
 
 
 def _beyond(joint: Joint, q: float) -> str:

@@ -35,6 +35,13 @@ def test_an_unknown_coupling_is_refused_and_the_valid_ones_are_listed(bioloid):
         sk.closed_mechanism(bioloid, primary=["nose.px"])
 
 
+def test_a_single_text_and_a_name_twice_are_refused(bioloid, default):
+    with pytest.raises(InputError, match=r"primary is the text 'waist\.px'; give a list"):
+        sk.closed_mechanism(bioloid, primary="waist.px")
+    with pytest.raises(InputError, match=r"primary names waist\.px twice"):
+        sk.closed_mechanism(bioloid, primary=["waist.px", *default.primary])
+
+
 def test_too_few_primary_couplings_name_the_ones_to_add(bioloid, default):
     short = [name for name in default.primary if name not in ("waist.rz", "left_hand.py")]
     with pytest.raises(InputError, match="26 secondary couplings but N has rank 24: 2 too many") as caught:

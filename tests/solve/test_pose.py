@@ -180,8 +180,9 @@ def test_a_joint_beyond_its_limits_is_named_with_position_and_limits(bioloid):
     solution = sk.solve_pose(robot, {n: sk.frame_pose(bioloid, state, n) for n in FEET}, state)
     assert list(solution.status) == [Status.OUT_OF_LIMITS, Status.CONVERGED]
     knee = np.degrees(state.q[bioloid.joint_names.index("right_knee")])
-    with pytest.raises(LimitError, match=rf"right_knee at {knee:.1f} deg, limits 0.0 to 28.6 deg"):
+    with pytest.raises(LimitError, match=rf"right_knee at {knee:.1f} deg, limits 0.0 to 28.6 deg") as caught:
         solution.raise_on_failure(robot)
+    assert (caught.value.limb, caught.value.sample) == ("right_leg", 0)
 
 
 def test_limits_of_a_slider_are_told_in_millimetres():
