@@ -26,6 +26,7 @@ from screwkin.trajectory import Trajectory
 Array = np.ndarray[Any, np.dtype[Any]]
 
 _SAME_ZMP = 1e-6  # m: what other versions' rounding may change
+_COARSE = 0.1  # s between samples: a step of a second would be told by ten
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,8 +68,13 @@ class Account:
 
     @property
     def outside(self) -> Array:
-        """Samples (T,) whose ZMP lies outside the support polygon."""
-        return self.balance.margin < 0.0
+        """Samples (T,) whose ZMP lies outside the support polygon, or where the ground would have to pull."""
+        return (self.balance.margin < 0.0) | self.pulled
+
+    @property
+    def pulled(self) -> Array:
+        """Samples (T,) at which the floor would have to hold the robot down: there is no ZMP there."""
+        return np.asarray(self.balance.wrench[:, 5] <= 0.0)
 
     @property
     def boundaries(self) -> tuple[float, ...]:
@@ -102,6 +108,12 @@ class Account:
         ]
         # In the words of a simulation's own warning, so that a page tells it once.
         found = [f"planned joint speed above the servo's: {', '.join(fast)}"] if fast else []
+        gap = float(np.diff(self.trajectory.time).max())
+        if gap > _COARSE:
+            found.append(f"samples are {gap:.3g} s apart; margins and spikes between them are not seen")
+        if self.pulled.any():
+            when = self.trajectory.time[int(self.pulled.argmax())]
+            found.append(f"the robot would leave the floor at {when:.2f} s: no ZMP exists there")
         near = [
             f"{limb.limb} comes near a singularity at {self.trajectory.time[limb.sample]:.2f} s: {limb.cause}"
             for limb in self.limbs
@@ -121,10 +133,18 @@ def account_of(robot: Robot, trajectory: Trajectory) -> Account:
     """The account of a trajectory of that robot.
 
     Raises:
-        InputError: joints or tips are not the robot's, or a foot has no sole.
+        InputError: joints or tips are not the robot's, or a foot has no sole. TrajectoryError: rates or
+            accelerations so large that no forces can be computed.
     """
     _check_tips(robot, trajectory)
-    balance = zmp(robot, trajectory)
+    with np.errstate(over="ignore", invalid="ignore"):
+        balance = zmp(robot, trajectory)
+    finite = np.isfinite(np.hstack([balance.wrench, balance.zmp])).all(axis=1)
+    if not finite.all():
+        raise TrajectoryError(
+            f"no finite ground wrench in sample {int(finite.argmin())}: "
+            "positions, rates or accelerations are beyond reason"
+        )
     mechanism = closed_mechanism(robot)
     T = pose_from_array(trajectory.T_world_base)
     twists = coupling_twists(mechanism, T.R, unstack(trajectory.q))

@@ -132,3 +132,26 @@ def test_foreign_tips_and_a_walk_without_feet_are_refused(robot, trajectory):
         account_of(robot, replace(trajectory, feet=(), contact=np.zeros((trajectory.samples, 0), dtype=bool)))
     with pytest.raises(InputError, match="joints"):
         account_of(sk.load_robot("bioloid24"), trajectory)
+
+
+def test_rates_beyond_all_forces_are_refused_instead_of_giving_no_number(robot, trajectory):
+    with pytest.raises(TrajectoryError, match="no finite ground wrench in sample 0"):
+        account_of(robot, replace(trajectory, qd=np.full_like(trajectory.qd, 1e300)))
+
+
+def test_a_robot_that_falls_faster_than_gravity_has_no_zmp_and_counts_as_outside(robot, trajectory):
+    falling = trajectory.base_acceleration.copy()
+    falling[5, 5] = -2 * 9.81
+    account = account_of(robot, replace(trajectory, base_acceleration=falling))
+    assert account.pulled.tolist() == [i == 5 for i in range(trajectory.samples)]
+    assert account.outside[5]
+    when = f"leave the floor at {trajectory.time[5]:.2f} s"
+    assert any(when in warning for warning in account.warnings)
+
+
+def test_coarse_samples_are_told(robot):
+    coarse = sk.walk(robot, sk.load_gait("walk").replace(rate=2.0), steps=1)
+    assert any("samples are 0.5 s apart" in warning for warning in account_of(robot, coarse).warnings)
+    assert not any(
+        "apart" in warning for warning in account_of(robot, sk.walk(robot, sk.load_gait("walk"), 1)).warnings
+    )
