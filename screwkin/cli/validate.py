@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -13,6 +14,7 @@ from screwkin.cli.options import AsJson, OutputFolder, TrajectoryPath
 from screwkin.cli.output import aligned, print_json, remark
 from screwkin.cli.simulation import Wish, simulate
 from screwkin.cli.simulation import engine as engine_named
+from screwkin.errors import OutputError
 from screwkin.files import make_folder
 from screwkin.report.account import account_of, recorded_robot
 from screwkin.report.numbers import validation_numbers
@@ -37,7 +39,7 @@ def validate(
     engine_named(engine)
     loaded = load_trajectory(trajectory)
     account = account_of(recorded_robot(loaded, str(trajectory)), loaded)
-    beside = make_folder(trajectory.parent)
+    beside = _beside(trajectory)
     wish = Wish(
         engine,
         gui,
@@ -55,6 +57,17 @@ def validate(
         print_verdict(check)
         print(f"files in {folder}{'' if folder == beside else f'; validation.json in {beside}'}")
     return 0 if check.passed else 3
+
+
+def _beside(trajectory: Path) -> Path:
+    """The trajectory's own folder, where its verdict belongs."""
+    try:
+        return make_folder(trajectory.parent)
+    except OutputError as error:
+        why = str(error).removesuffix(" Name another folder.")
+        raise OutputError(
+            f"validation.json belongs beside {trajectory}: {why} Copy the trajectory to a folder of yours."
+        ) from None
 
 
 def print_verdict(check: Validation) -> None:

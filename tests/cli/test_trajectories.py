@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import screwkin as sk
+from screwkin.errors import OutputError
 
 
 @pytest.fixture
@@ -104,6 +105,18 @@ def test_a_bad_file_is_told_once_and_nothing_is_written(cli, refused, walked, tm
     assert named in message
     assert str(path) in message
     assert sorted(tmp_path.iterdir()) == before
+
+
+def test_a_trajectory_in_a_folder_of_others_tells_what_to_do(cli, refused, walked, monkeypatch):
+    """Another output folder would not help: the verdict lies beside its trajectory."""
+
+    def forbidden(folder):
+        raise OutputError(f"cannot write to folder {folder}: Permission denied. Name another folder.")
+
+    monkeypatch.setattr("screwkin.cli.validate.make_folder", forbidden)
+    message = refused(cli("validate", walked / "trajectory.npz"), 2)
+    assert "Permission denied. Copy the trajectory to a folder of yours" in message
+    assert "Name another" not in message
 
 
 def test_the_csv_is_not_enough(cli, refused, walked):
