@@ -1,0 +1,1 @@
+"""What results are worth: verdicts on walks, comparisons of models and methods, maps."""

@@ -1,0 +1,1 @@
+"""Servos behind one small interface."""
