@@ -1,4 +1,4 @@
-"""Where robots and gaits are found: bundled ones by name, any other by its path."""
+"""Where robots, gaits and papers are found: bundled ones by name, any other by its path."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 from screwkin.errors import UnknownNameError
 
-ROBOTS, GAITS = "robots", "trajectories"
+ROBOTS, GAITS, PAPERS = "robots", "trajectories", "papers"
 
 
 def robot_names() -> tuple[str, ...]:
@@ -18,6 +18,11 @@ def robot_names() -> tuple[str, ...]:
 def gait_names() -> tuple[str, ...]:
     """Names of the bundled gaits."""
     return _names(GAITS)
+
+
+def paper_names() -> tuple[str, ...]:
+    """Names of the bundled lists of what papers tell, to be reproduced."""
+    return _names(PAPERS)
 
 
 def find_robot(name_or_path: str | Path) -> Path:
@@ -36,6 +41,15 @@ def find_gait(name_or_path: str | Path) -> Path:
         UnknownNameError: neither a bundled name nor a file; it lists the names.
     """
     return _find("gait", GAITS, name_or_path)
+
+
+def find_paper(name_or_path: str | Path) -> Path:
+    """The file of a bundled paper's tables and figures, or of any such file by its path.
+
+    Raises:
+        UnknownNameError: neither a bundled name nor a file; it lists the names.
+    """
+    return _find("paper", PAPERS, name_or_path)
 
 
 def data_folder(kind: str) -> Path:

@@ -1,0 +1,108 @@
+"""``screwkin reproduce``."""
+
+from __future__ import annotations
+
+import json
+import platform
+import shlex
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from screwkin.analysis.bench import Bench
+from screwkin.analysis.papers import load_paper
+from screwkin.analysis.reproduce import MARKS, Reproduction, check_paper, written
+from screwkin.analysis.reproduce import reproduce as measured
+from screwkin.cli.folder import output_folder
+from screwkin.cli.options import AsJson, OutputFolder
+from screwkin.cli.output import aligned, plain, print_json, progress_bar
+from screwkin.files import atomic_write
+
+_TRACED = ("screwkin", "numpy", "scipy", "pybullet")
+
+
+def reproduce(
+    name: Annotated[
+        str, typer.Argument(metavar="NAME", help="A bundled paper's name, or the path of such a file.")
+    ],
+    plots: Annotated[bool, typer.Option(help="Draw the figures and write the pages.")] = True,
+    output: OutputFolder = None,
+    as_json: AsJson = False,
+) -> int:
+    """Measure every table and figure of a paper again: the printed value beside ours, and why they differ.
+
+    Makes rows.json, and README.md and report.html with the figures drawn again. Takes minutes.
+    """
+    paper = load_paper(name)
+    check_paper(paper)
+    bench = Bench(paper.robot)
+    with output_folder(output, "reproduce", paper.name) as folder:
+        with progress_bar("measuring") as done:
+            found = measured(paper, bench, done)
+        rows = [line.to_dict() for line in found.lines]
+        with atomic_write(folder / "rows.json") as file:
+            file.write(
+                json.dumps(plain({"rows": rows}), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+            )
+        if plots:
+            _draw(found, bench, folder, _command(name, output))
+    if as_json:
+        print_json({"paper": paper.name, "rows": rows, "folder": str(folder)})
+    else:
+        print(_text(found))
+        print(f"files in {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}")
+    return 0
+
+
+def _draw(found: Reproduction, bench: Bench, folder: Path, command: str) -> None:
+    from screwkin.report.reproduction import draw_pictures, write_pages
+
+    with progress_bar("pictures") as done:
+        pictures = draw_pictures(found.paper, bench, folder, done)
+    write_pages(found, pictures, folder, command, _versions())
+
+
+def _command(name: str, output: Path | None) -> str:
+    """The command line that makes the same pages again."""
+    return shlex.join(["screwkin", "reproduce", name, *([] if output is None else ["-o", str(output)])])
+
+
+def _versions() -> str:
+    """Versions of what computes."""
+    told = [f"Python {platform.python_version()}"]
+    for package in _TRACED:
+        try:
+            told.append(f"{package} {version(package)}")
+        except PackageNotFoundError:
+            if package == "screwkin":
+                from screwkin import __version__
+
+                told.append(f"screwkin {__version__}")
+    return ", ".join(told)
+
+
+def _text(found: Reproduction) -> str:
+    parts = [found.paper.title]
+    for section in found.sections:
+        start = f"{section.section.place}: "
+        rows = [
+            (
+                line.item.removeprefix(start),
+                written(line.paper) or "–",
+                written(line.ours, line.form) or "–",
+                MARKS[line.agrees],
+            )
+            for line in section.lines
+        ]
+        if rows:
+            parts += [
+                "",
+                f"{start}{section.section.title}",
+                aligned([("", "paper", "ours", ""), *rows], "  "),
+            ]
+    differing = [f"  {line.item}: {line.note}" for line in found.lines if line.agrees is False]
+    if differing:
+        parts += ["", "where they differ", *differing]
+    return "\n".join([*parts, "", found.summary])
