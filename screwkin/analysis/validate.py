@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from screwkin.errors import InputError, UnknownNameError
+from screwkin.gait.balance import zmp as balance_of
 from screwkin.model.robot import Robot
 from screwkin.sim.backend import Array, Backend
 from screwkin.sim.camera import Camera, Picture
@@ -166,7 +167,7 @@ def judged(robot: Robot, trajectory: Trajectory, run: Run, criteria: Criteria) -
         zmp_rms_xy_mm=rms,
         zmp_max_xy_mm=largest,
         ankle_rms_xy_mm=ankle,
-        min_margin_mm=1e3 * float(trajectory.margin.min()),
+        min_margin_mm=1e3 * _least_margin(robot, trajectory),
         slip_mm=1e3 * slipped.largest,
         slip_total_mm=1e3 * slipped.total,
         slip_turn_deg=float(np.rad2deg(slipped.turned)),
@@ -180,6 +181,11 @@ def judged(robot: Robot, trajectory: Trajectory, run: Run, criteria: Criteria) -
     )
     reasons = _reasons(facts, criteria)
     return replace(facts, passed=not reasons, reasons=reasons)
+
+
+def _least_margin(robot: Robot, trajectory: Trajectory) -> float:
+    """The smallest margin [m], recorded or computed anew: a verdict does not rest on what a file says."""
+    return float(min(trajectory.margin.min(), balance_of(robot, trajectory).margin.min()))
 
 
 def _reasons(facts: Validation, rule: Criteria) -> tuple[str, ...]:
