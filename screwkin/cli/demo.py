@@ -58,7 +58,10 @@ def demo(
         tell(
             f"   The loops close to {account.max_closure:.0e} m; rates and accelerations by Davies' method.\n"
         )
-        tell("4. The ZMP, from the dynamics of all links")
+        tell(
+            "4. The zero-moment point (ZMP), from the dynamics of all links: where the floor's force acts\n"
+            "   It must stay inside the soles that bear. GCoM is the centre of mass, projected on the floor."
+        )
         tell(aligned(balance_numbers(account), "   ") + "\n")
         tell("5. The simulation: bodies, motors and contacts decide")
         npz = folder / "trajectory.npz"

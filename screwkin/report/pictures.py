@@ -81,7 +81,8 @@ def _motion(account: Account) -> list[Plot]:
         Plot(
             "top_view",
             the_walk,
-            "Seen from above: where the soles stand, the support polygons, and the ways of GCoM and ZMP.",
+            "Seen from above: where the soles stand, the support polygons, and the ways of GCoM (the centre "
+            "of mass, projected on the floor) and ZMP (the zero-moment point, where the floor's force acts).",
             lambda: balance.seen_from_above(account),
         ),
         Plot(
