@@ -1,0 +1,359 @@
+"""The servo bus: the makers' driver, ``dynamixel_sdk``, behind one small interface.
+
+Only this file imports the driver and pyserial, when a bus is opened. The driver makes and reads the
+packets of both protocols; here are its time-outs (on a clock that may be a simulated one), its retries with a
+bound, the names of its error bits, and statistics of its round trips.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from typing import Any, Literal
+
+from screwkin.errors import InputError, MissingDependencyError, ScrewkinError
+from screwkin.servo.line import (
+    BITS,
+    BROADCAST,
+    NUMBERS,
+    REFUSED,
+    BusError,
+    Clock,
+    ErrorBit,
+    Line,
+    LineLostError,
+    MonotonicClock,
+    PortError,
+    RefusedError,
+    Reply,
+    Statistics,
+)
+
+_MOST_NOISE = 4096  # bytes of one reply that are waited through before a babbling line counts as silent
+_BITS_PER_BYTE = 10  # a start bit, eight data bits and a stop bit
+_MOST_STRANGERS = 8  # sound packets of other servos that are passed over
+
+Grouped = Literal["none", "sync", "bulk"]
+"""One packet that several servos answer in turn: sync read of protocol 2.0, bulk read of MX servos on 1.0."""
+
+
+class _Port:
+    """What the driver takes for its port: a line and a clock."""
+
+    def __init__(self, line: Line, clock: Clock, baud: int, patience: float) -> None:
+        self.line, self.clock, self.baud, self.patience = line, clock, baud, patience
+        self.is_open, self.is_using = True, False
+        self.deadline, self.taken = clock.now(), 0
+
+    def getBaudRate(self) -> int:
+        return self.baud
+
+    def clearPort(self) -> None:
+        self._guarded(self.line.reset_input_buffer)
+
+    def writePort(self, packet: Sequence[int]) -> int:
+        sent = self._guarded(lambda: self.line.write(bytes(packet)))
+        return len(packet) if sent is None else int(sent)
+
+    def readPort(self, length: int) -> bytes:
+        if self.taken >= _MOST_NOISE:
+            return b""
+        data = bytes(self._guarded(lambda: self.line.read(max(0, length))))
+        self.taken += len(data)
+        if not data and length > 0:
+            self.clock.sleep(1e-4)
+        return data
+
+    def setPacketTimeout(self, packet_length: int) -> None:
+        self.setPacketTimeoutMillis(1e3 * (packet_length * _BITS_PER_BYTE / self.baud + self.patience))
+
+    def setPacketTimeoutMillis(self, msec: float) -> None:
+        self.deadline, self.taken = self.clock.now() + 1e-3 * msec, 0
+
+    def isPacketTimeout(self) -> bool:
+        return self.clock.now() > self.deadline or self.taken >= _MOST_NOISE
+
+    def _guarded(self, act: Callable[[], Any]) -> Any:
+        """A line that fails is lost."""
+        try:
+            return act()
+        except (OSError, TypeError) as error:  # pyserial: a TypeError when its port is closed under it
+            if isinstance(error, ScrewkinError):
+                raise
+            raise LineLostError(f"the port is gone ({error}); is the cable plugged in?") from None
+
+
+class Bus:
+    """Servos on a line, by their ids. Every exchange is tried ``1 + retries`` times, then it is an error.
+
+    Args:
+        line: open, and ours alone.
+        protocol: 1.0 or 2.0, of all servos on it.
+        baud: bits per second, for the time-outs.
+        clock: what time-outs and statistics go by.
+        retries: how often an exchange is repeated that got no sound reply.
+        patience: time [s] that a reply may take beyond that of its bytes: return delay and adapter.
+    """
+
+    def __init__(
+        self,
+        line: Line,
+        protocol: float = 1.0,
+        baud: int = 1_000_000,
+        clock: Clock | None = None,
+        *,
+        retries: int = 1,
+        patience: float = 0.020,
+    ) -> None:
+        sdk = _driver()
+        self.line, self.protocol, self.baud, self.retries = line, protocol, baud, retries
+        self.clock: Clock = clock or MonotonicClock()
+        self.statistics = Statistics()
+        self._sdk = sdk
+        self._port = _Port(line, self.clock, baud, patience)
+        self._handler = sdk.PacketHandler(protocol)
+
+    def close(self) -> None:
+        """Give the line back; what the servos do is not changed by it."""
+        self.line.close()
+
+    def ping(self, id: int) -> int:
+        """Model number of the servo.
+
+        Raises:
+            BusError: no sound reply. LineLostError: the port is gone.
+        """
+        return int(self._exchange(id, "ping", lambda: self._handler.ping(self._port, id))[0])
+
+    def read(self, id: int, address: int, length: int) -> Reply:
+        """Bytes of a servo's table.
+
+        Raises:
+            BusError: no sound reply. RefusedError: there is no such address. LineLostError.
+        """
+        data, errors = self._exchange(id, "read", lambda: self._ask(id, address, length), length)
+        self._heed(id, f"reading {length} bytes at {address}", errors)
+        return Reply(id, bytes(data), errors)
+
+    def write(self, id: int, address: int, value: int, length: int) -> Reply:
+        """Write a number into a servo's table, and wait for the reply unless to all (254).
+
+        Raises:
+            BusError: no sound reply. RefusedError: address or value is not accepted. LineLostError.
+        """
+        data = list(_bytes(value, length))
+        if id == BROADCAST:
+            self._send(lambda: self._handler.writeTxOnly(self._port, id, address, length, data))
+            return Reply(id, b"")
+        _, errors = self._exchange(
+            id, "write", lambda: (None, *self._handler.writeTxRx(self._port, id, address, length, data))
+        )
+        self._heed(id, f"writing {value} at {address}", errors)
+        return Reply(id, b"", errors)
+
+    def reg_write(self, id: int, address: int, value: int, length: int) -> Reply:
+        """Like ``write``, but done only at ``action``."""
+        data = list(_bytes(value, length))
+        _, errors = self._exchange(
+            id,
+            "reg write",
+            lambda: (None, *self._handler.regWriteTxRx(self._port, id, address, length, data)),
+        )
+        self._heed(id, f"preparing {value} at {address}", errors)
+        return Reply(id, b"", errors)
+
+    def action(self) -> None:
+        """All servos do what ``reg_write`` prepared; nobody answers."""
+        self._send(lambda: self._handler.action(self._port, BROADCAST))
+
+    def sync_write(self, address: int, length: int, data: Mapping[int, bytes]) -> None:
+        """Write so many bytes at one address of several servos, in one packet that nobody answers.
+
+        Raises:
+            InputError: bytes of another length. LineLostError: the port is gone.
+        """
+        wrong = [id for id, item in data.items() if len(item) != length]
+        if wrong or not data:
+            raise InputError(f"sync write of {length} bytes: ids {wrong} got others, of {len(data)} servos")
+        group = self._sdk.GroupSyncWrite(self._port, self._handler, address, length)
+        for id, item in data.items():
+            group.addParam(id, list(item))
+        self._send(group.txPacket)
+
+    def read_many(
+        self, ids: Sequence[int], address: int, length: int, grouped: Grouped = "none"
+    ) -> dict[int, Reply]:
+        """Bytes at one address of several servos; those that gave no sound reply are left out.
+
+        Args:
+            ids: of the servos.
+            address: first byte of each servo's table.
+            length: number of bytes.
+            grouped: ask all in one packet, where all of them know it (an AX-12 knows none); who does not
+                answer to it is asked alone.
+
+        Raises:
+            LineLostError: the port is gone.
+        """
+        found = self._grouped(ids, address, length, grouped) if grouped != "none" and len(ids) > 1 else {}
+        for id in ids:
+            if id not in found:
+                try:
+                    found[id] = self.read(id, address, length)
+                except LineLostError:
+                    raise
+                except BusError:
+                    continue
+        return {id: found[id] for id in ids if id in found}
+
+    def _grouped(self, ids: Sequence[int], address: int, length: int, grouped: Grouped) -> dict[int, Reply]:
+        """The replies to one sync or bulk read, up to the first that is missing."""
+        if grouped == "sync":
+            count = len(ids)
+            self._send(lambda: self._handler.syncReadTx(self._port, address, length, list(ids), count, False))
+        else:
+            rows = [number for id in ids for number in (length, id, address)]
+            self._send(lambda: self._handler.bulkReadTx(self._port, rows, len(rows)))
+        found: dict[int, Reply] = {}
+        for id in ids:
+            self.statistics.exchanges += 1
+            began = self.clock.now()
+            answer = self._try(partial(self._receive, id))
+            data, result, error = answer if isinstance(answer, tuple) else (b"", answer, 0)
+            if result != self._sdk.COMM_SUCCESS or len(data) != length:
+                self.statistics.failed += 1
+                break
+            self.statistics.answered(self.clock.now() - began)
+            found[id] = Reply(id, bytes(data), self._named(int(error)))
+        return found
+
+    def _ask(self, id: int, address: int, length: int) -> tuple[bytes, int, int]:
+        result = self._handler.readTx(self._port, id, address, length)
+        return self._receive(id) if result == self._sdk.COMM_SUCCESS else (b"", result, 0)
+
+    def _receive(self, id: int) -> tuple[bytes, int, int]:
+        """Parameters of the servo's next status packet, the driver's result, and the error byte.
+
+        The driver's own reads take the checksum for data when a packet is shorter than was asked for.
+        """
+        # Place and width of the length, place of the error byte, bytes that the length counts besides.
+        at, width, error, around = (3, 1, 4, 2) if self.protocol == 1.0 else (5, 2, 8, 4)
+        options = () if self.protocol == 1.0 else (False,)
+        result = self._sdk.COMM_RX_TIMEOUT
+        for _ in range(_MOST_STRANGERS):
+            packet, result = self._handler.rxPacket(self._port, *options)
+            if result != self._sdk.COMM_SUCCESS:
+                break
+            if packet[4 if self.protocol == 2.0 else 2] == id:
+                count = int.from_bytes(bytes(packet[at : at + width]), "little") - around
+                return bytes(packet[error + 1 : error + 1 + max(0, count)]), result, packet[error]
+        return b"", result, 0
+
+    def _send(self, act: Callable[[], Any]) -> None:
+        """Send what nobody answers."""
+        result = self._try(act)
+        if result not in (self._sdk.COMM_SUCCESS, self._sdk.COMM_NOT_AVAILABLE):
+            raise LineLostError("the port does not take the packet; is the cable plugged in?")
+
+    def _exchange(
+        self, id: int, what: str, act: Callable[[], Any], length: int = 0
+    ) -> tuple[Any, frozenset[ErrorBit]]:
+        """Payload and errors of a sound reply, after as many tries as are allowed."""
+        if not 0 <= id < BROADCAST - 1:
+            raise InputError(f"id {id} is none of a servo; ids go from 0 to {BROADCAST - 2}")
+        self.statistics.exchanges += 1
+        result, errors = self._sdk.COMM_RX_TIMEOUT, frozenset[ErrorBit]()
+        for attempt in range(1 + self.retries):
+            self.statistics.retries += attempt > 0
+            began = self.clock.now()
+            answer = self._try(act)
+            payload, result, error = answer if isinstance(answer, tuple) else (None, answer, 0)
+            errors = self._named(int(error))
+            short = length and (payload is None or len(payload) != length)
+            refused = bool(errors & REFUSED)
+            if result == self._sdk.COMM_SUCCESS and "checksum" not in errors and (refused or not short):
+                self.statistics.answered(self.clock.now() - began)
+                return payload, errors
+            silent = result == self._sdk.COMM_RX_TIMEOUT
+            self.statistics.silent += silent
+            self.statistics.corrupt += not silent
+        self.statistics.failed += 1
+        how = "does not answer" if result == self._sdk.COMM_RX_TIMEOUT else "answers with damaged packets"
+        raise BusError(f"servo {id} {how} to a {what}, tried {1 + self.retries} times", id)
+
+    def _try(self, act: Callable[[], Any]) -> Any:
+        """The driver's answer; bytes that it stumbles over are a damaged packet."""
+        try:
+            return act()
+        except (IndexError, ValueError, UnboundLocalError):
+            return self._sdk.COMM_RX_CORRUPT
+        finally:
+            self._port.is_using = False
+
+    def _named(self, error: int) -> frozenset[ErrorBit]:
+        if self.protocol == 2.0:
+            number: frozenset[ErrorBit] = frozenset(
+                {NUMBERS[error & 0x7F]} if error & 0x7F in NUMBERS else ()
+            )
+            return number | {"hardware"} if error & 0x80 else number
+        return frozenset(name for bit, name in enumerate(BITS) if error >> bit & 1)
+
+    def _heed(self, id: int, doing: str, errors: frozenset[ErrorBit]) -> None:
+        if errors & REFUSED:
+            named = ", ".join(sorted(errors & REFUSED))
+            raise RefusedError(f"servo {id} refused ({named} error) {doing}", id, errors)
+
+
+def open_line(port: str, baud: int = 1_000_000, rs485: bool = False) -> Line:
+    """A serial port, ours alone.
+
+    Args:
+        port: such as ``/dev/ttyUSB0``.
+        baud: bits per second.
+        rs485: let the kernel switch the direction of an RS-485 transceiver.
+
+    Raises:
+        PortError: not there, not allowed, in use, or no such baud rate; lists the ports that are there.
+    """
+    try:
+        import serial
+        from serial.rs485 import RS485Settings
+    except ImportError:
+        raise MissingDependencyError(
+            "pyserial is not installed; install it with: pip install pyserial"
+        ) from None
+    try:
+        line = serial.Serial(port, baud, timeout=0, write_timeout=0.1, exclusive=True)
+        if rs485:
+            line.rs485_mode = RS485Settings()
+    except (OSError, ValueError) as error:
+        there = ", ".join(port_names()) or "none"
+        raise PortError(
+            f"cannot open port {port}: {error}. Ports found: {there}; permissions: docs/hardware.md"
+        ) from None
+    opened: Line = line
+    return opened
+
+
+def port_names() -> tuple[str, ...]:
+    """Serial ports of this computer."""
+    from serial.tools.list_ports import comports
+
+    return tuple(sorted(str(port.device) for port in comports()))
+
+
+def _driver() -> Any:
+    try:
+        import dynamixel_sdk
+    except ImportError:
+        raise MissingDependencyError(
+            "dynamixel-sdk is not installed; install it with: pip install dynamixel-sdk"
+        ) from None
+    return dynamixel_sdk
+
+
+def _bytes(value: int, length: int) -> bytes:
+    try:
+        return int(value).to_bytes(length, "little")
+    except (OverflowError, ValueError) as error:
+        raise InputError(f"{value} does not fit into {length} bytes of a servo's table ({error})") from None
