@@ -30,7 +30,7 @@ class Balance:
         zmp: (T, 2) from the multibody ground wrench [m].
         com: (T, 3) [m].
         wrench: (T, 6), the ground's [m; f] about the world origin [N m, N].
-        margin: (T,) distance of the ZMP inside the support polygon, negative outside [m].
+        margin: (T,) distance of the ZMP inside the support polygon [m], negative outside and in flight.
         spikes: local maxima of |GCoM - ZMP| above twice its median.
         cart_table: (T, 2) ZMP of a point mass at the CoM, for comparison [m].
     """
@@ -105,6 +105,20 @@ def ground_reaction(
     )
 
 
+def ground_margin(zmp: Array, com: Array, wrench: Array, soles: Array, contact: Array) -> Array:
+    """Margin (T,) of the ZMP within the bearing soles; where they would have to pull, minus the CoM's height.
+
+    Args:
+        zmp: (T, 2) [m].
+        com: (T, 3) [m].
+        wrench: the ground's [m; f] (T, 6); a ZMP says nothing where its f_z is not positive.
+        soles: (T, feet, corners, 2) [m].
+        contact: (T, feet).
+    """
+    margin = support_margin(zmp, soles, contact)
+    return np.where(wrench[:, 5] > 0, margin, np.minimum(margin, 0.0) - np.abs(com[:, 2]))
+
+
 def zmp(robot: Robot, trajectory: Trajectory) -> Balance:
     """CoM, ZMP, margin and spikes of a trajectory, computed anew from its positions, rates and accelerations.
 
@@ -112,10 +126,12 @@ def zmp(robot: Robot, trajectory: Trajectory) -> Balance:
         InputError: the joints are not those of the robot, or a foot has no sole.
     """
     if trajectory.joint_names != robot.joint_names:
-        strange = sorted(set(trajectory.joint_names) ^ set(robot.joint_names))
-        raise InputError(
-            f"the trajectory's joints are not those of {robot.name}: {', '.join(strange) or 'other order'}"
-        )
+        lacking = [name for name in robot.joint_names if name not in trajectory.joint_names]
+        foreign = [name for name in trajectory.joint_names if name not in robot.joint_names]
+        found = [f"it lacks {', '.join(lacking)}"] if lacking else []
+        found += [f"it has the foreign {', '.join(foreign)}"] if foreign else []
+        told = " and ".join(found) or "they stand in another order"
+        raise InputError(f"the trajectory's joints are not those of {robot.name}: {told}")
     point, com, wrench, cart = ground_reaction(
         robot,
         trajectory.T_world_base,
@@ -126,5 +142,5 @@ def zmp(robot: Robot, trajectory: Trajectory) -> Balance:
         trajectory.base_acceleration,
     )
     soles = soles_on_floor(robot, trajectory.feet, trajectory.T_world_tip)
-    margin = support_margin(point, soles, trajectory.contact)
+    margin = ground_margin(point, com, wrench, soles, trajectory.contact)
     return Balance(point, com, wrench, margin, spikes(trajectory.time, com[:, :2], point), cart)

@@ -117,7 +117,8 @@ def plan_around(
         feet, contact = feet_motion(gait, stance, holds, phase)
         hands = hands_motion(gait, stance, waist, phase)
     _check_finite(gait, {"waist": waist, **feet, **hands})
-    gap = check_soles(gait, stance, feet, time)
+    with np.errstate(all="ignore"):
+        gap = check_soles(gait, stance, feet, time)
     return Plan(
         gait=gait,
         steps=steps,

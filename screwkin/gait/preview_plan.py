@@ -115,6 +115,8 @@ def _settings(gait: Gait) -> dict[str, float]:
             faults.append(Fault("[parameters]", name, "missing", "A preview gait needs it"))
     numbers = {name: gait.numbers.get(name, np.nan) for name in SETTINGS}
     lifted = gait.channels["foot_height"].at[0]
+    if faults:
+        raise GaitError(gait.path or f"gait {gait.name}", faults)
     if not 0 < numbers["dsp"] <= lifted + 1e-12:
         found = f"{numbers['dsp']:g} does not lie above 0 and up to liftoff at {lifted:g} Tc"
         faults.append(Fault("[parameters]", "dsp", found, "The ZMP must arrive before the foot leaves"))

@@ -29,8 +29,10 @@ def stance_of(robot: Robot) -> Stance:
     """What a gait must know of a robot, read from its table at the home posture.
 
     Raises:
-        InputError: no ``home`` posture, not one leg on either side, or a leg without sole.
+        InputError: a fixed base, no ``home`` posture, not one leg on either side, or a leg without sole.
     """
+    if robot.base != "floating":
+        raise InputError(f"robot {robot.name} has a fixed base; only one with a floating base can walk")
     if "home" not in [posture.name for posture in robot.postures]:
         raise InputError(f"robot {robot.name} has no posture 'home'; a walk needs one with bent knees")
     D = link_displacements(robot, list(robot.posture("home").q))

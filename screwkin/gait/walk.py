@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from screwkin.dynamics.support import support_margin
-from screwkin.gait.balance import ground_reaction, soles_on_floor
+from screwkin.errors import InputError
+from screwkin.gait.balance import ground_margin, ground_reaction, soles_on_floor
 from screwkin.gait.plan import Plan, plan
 from screwkin.gait.preview_plan import preview_plan
 from screwkin.gait.realise import differentiate, positions, stance_of
@@ -42,6 +42,8 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
         UnreachableError, SingularError, LimitError: names limb, sample and time.
         GaitError, InputError: the gait does not fit the robot.
     """
+    if not (isinstance(robot, Robot) and isinstance(gait, Gait)):
+        raise InputError("walk takes a robot from load_robot and a gait from load_gait, not names or paths")
     steps = gait.steps if steps is None else steps
     mechanism = closed_mechanism(robot)
     if gait.kind == "preview":
@@ -51,7 +53,7 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
     solution = positions(robot, mechanism, made)
     motion = differentiate(mechanism, made, solution.state)
     tip_poses = _tip_poses(robot, made, motion.q)
-    zmp, com, _, _ = ground_reaction(
+    zmp, com, wrench, _ = ground_reaction(
         robot, made.T_world_base, motion.q, motion.qd, motion.qdd, made.base_twist, made.base_acceleration
     )
     soles = soles_on_floor(robot, made.feet, tip_poses)
@@ -69,7 +71,7 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
         feet=made.feet,
         com=com,
         zmp=zmp,
-        margin=support_margin(zmp, soles, made.contact),
+        margin=ground_margin(zmp, com, wrench, soles, made.contact),
         meta={
             "robot": {
                 "name": robot.name,
