@@ -9,6 +9,9 @@ remedies, both computed from statics before the walk:
 - ``joint``: every joint is told q - theta. Posture and both feet are put right. While both feet bear, the
   deflections of standing on either are blended by the share of the load, so that no command jumps.
 
+In statics the robot stands still on a foot that its CoM is not above, and the ankle must hold it; in a walk
+the ZMP is there. The model ``dynamic`` takes the torques of the walk itself and is free of that error.
+
 Source: paper B, section 5, algorithm of four steps (``swing``); docs/papers.md.
 """
 
@@ -24,8 +27,9 @@ from numpy.typing import NDArray
 
 from screwkin.dynamics.springs import StiffnessChoice, joint_stiffness
 from screwkin.dynamics.stiffness import Deflection, static_deflection
-from screwkin.dynamics.stiffness import Method as Model
+from screwkin.dynamics.stiffness import Method as StaticModel
 from screwkin.errors import InputError, LimitError, NoSolutionError
+from screwkin.gait.feed_forward import walking_torques
 from screwkin.gait.loads import load_shares
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.model.robot import Robot
@@ -36,9 +40,10 @@ from screwkin.trajectory import Trajectory
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 Method = Literal["swing", "joint"]
+Model = Literal["linear", "nonlinear", "dynamic"]
 
 METHODS: tuple[Method, ...] = ("swing", "joint")
-MODELS: tuple[Model, ...] = ("linear", "nonlinear")
+MODELS: tuple[Model, ...] = ("linear", "nonlinear", "dynamic")
 LIMIT_SLACK = 1e-9
 """How far rounding may take a joint beyond its limits [rad or m]."""
 
@@ -60,7 +65,8 @@ def compensate(
         method: ``swing`` moves the target of the foot in the air; ``joint`` commands q - theta.
         passes: how often what is still missing is predicted and subtracted.
         model: how deflections are predicted. For ``joint``, ``linear`` takes the torques of the intended
-            posture; the compensated robot stands in it, so that the first pass is exact already.
+            posture; the compensated robot stands in it, so that the first pass is exact already. ``dynamic``,
+            for ``joint`` only, takes those of the intended motion, and needs no further pass either.
 
     Returns:
         Trajectory with the commanded ``q`` and ``qd``; all other fields stay those of the intended motion.
@@ -105,7 +111,7 @@ def convergence(
     stiffness: StiffnessChoice = None,
     passes: int = 5,
     method: Method = "swing",
-    model: Model = "nonlinear",
+    model: StaticModel = "nonlinear",
 ) -> tuple[Remaining, ...]:
     """What every pass of a compensation leaves of the swing foot's position error; row 0 is without any.
 
@@ -113,6 +119,8 @@ def convergence(
     other foot's tip in the nonlinear equilibrium, against the intended one, with the bearing foot in place.
     """
     rows: list[Remaining] = []
+    if model not in ("linear", "nonlinear"):
+        raise InputError(f"model {model!r} knows no static equilibrium; valid: linear, nonlinear")
     for change in _commands(robot, trajectory, stiffness, method, passes, model):
         missed = 1e3 * _swing_errors(robot, trajectory, trajectory.q + change, stiffness, "nonlinear")
         x, y, z = np.abs(missed).max(axis=(0, 1)).tolist()
@@ -138,7 +146,9 @@ def _commands(
     yield change
     shifts = np.zeros((trajectory.samples, len(trajectory.feet), 3))
     for _ in range(passes):
-        if method == "joint":
+        if model == "dynamic":
+            change = walking_torques(robot, trajectory) / joint_stiffness(robot, stiffness)
+        elif method == "joint":
             at = trajectory.q if model == "linear" else trajectory.q + change
             change = -_blended_deflection(robot, trajectory, shares, at, stiffness, model)
         else:
@@ -149,7 +159,12 @@ def _commands(
 
 
 def _blended_deflection(
-    robot: Robot, trajectory: Trajectory, shares: Array, q: Array, stiffness: StiffnessChoice, model: Model
+    robot: Robot,
+    trajectory: Trajectory,
+    shares: Array,
+    q: Array,
+    stiffness: StiffnessChoice,
+    model: StaticModel,
 ) -> Array:
     """Deflections (T, n) of standing on either foot, weighted by its share (T, 2) of the load."""
     theta = np.zeros_like(q)
@@ -161,7 +176,7 @@ def _blended_deflection(
 
 
 def _swing_errors(
-    robot: Robot, trajectory: Trajectory, q: Array, stiffness: StiffnessChoice, model: Model
+    robot: Robot, trajectory: Trajectory, q: Array, stiffness: StiffnessChoice, model: StaticModel
 ) -> Array:
     """Where feet in the air are, less where they should be, (T, feet, 3) [m]; 0 for feet that bear."""
     missed = np.zeros((trajectory.samples, len(trajectory.feet), 3))
@@ -197,7 +212,7 @@ def _deflected(
     foot: int,
     rows: NDArray[np.intp],
     stiffness: StiffnessChoice,
-    model: Model,
+    model: StaticModel,
 ) -> _Yielded:
     """The robot commanded q[rows] (B, n) on one foot, which stands where the trajectory has it."""
     D = link_displacements(robot, unstack(q[rows]))
@@ -253,6 +268,8 @@ def _check_choices(method: str, passes: object, model: str) -> None:
     for what, chosen, valid in (("method", method, METHODS), ("model", model, MODELS)):
         if chosen not in valid:
             raise InputError(f"unknown {what} {chosen!r} of compensation; valid: {', '.join(valid)}")
+    if model == "dynamic" and method != "joint":
+        raise InputError("model 'dynamic' is for method 'joint'; a foot's target is corrected by statics")
     if isinstance(passes, bool) or not isinstance(passes, numbers.Integral) or passes < 1:
         raise InputError(f"passes is {passes!r}; it must be a whole number of at least 1")
 

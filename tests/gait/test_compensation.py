@@ -171,7 +171,8 @@ def test_another_robot_with_arms_is_compensated_too() -> None:
     ("choice", "message"),
     [
         ({"method": "foot"}, "unknown method 'foot' of compensation; valid: swing, joint"),
-        ({"model": "cubic"}, "unknown model 'cubic' of compensation; valid: linear, nonlinear"),
+        ({"model": "cubic"}, "unknown model 'cubic' of compensation; valid: linear, nonlinear, dynamic"),
+        ({"model": "dynamic", "method": "swing"}, "model 'dynamic' is for method 'joint'"),
         ({"passes": 0}, "passes is 0; it must be a whole number of at least 1"),
         ({"passes": 1.5}, "passes is 1.5"),
         ({"stiffness": 0}, "stiffness is 0; it must be a positive number"),
@@ -183,6 +184,11 @@ def test_wrong_choices_are_refused(
 ) -> None:
     with pytest.raises(InputError, match=message):
         compensate(robot, walked, **choice)
+
+
+def test_the_walks_own_torques_seek_no_static_equilibrium(robot: sk.Robot, walked: sk.Trajectory) -> None:
+    with pytest.raises(InputError, match="model 'dynamic' knows no static equilibrium"):
+        convergence(robot, walked, K, model="dynamic")  # type: ignore[arg-type]
 
 
 def test_what_cannot_be_compensated_is_told_with_its_time(robot: sk.Robot, walked: sk.Trajectory) -> None:

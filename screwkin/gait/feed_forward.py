@@ -1,0 +1,50 @@
+"""Torques that a walk needs of its joints, weight and motion together, also while both feet bear.
+
+On one foot they are settled by the motion. On two, forces between the feet are free to choose; here each foot
+bears its share of the load, and lies to its centre of pressure as both feet's balance point lies to the ZMP.
+So neither ankle twists against the other, and torques pass without a jump into those of single support.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from screwkin.dynamics.newton_euler import GRAVITY, Bodies, inverse_dynamics
+from screwkin.gait.loads import load_shares
+from screwkin.model.robot import Robot
+from screwkin.screw import Wrench, power
+from screwkin.se3 import as_array, cross, pose_from_array, twist_from_array, unstack, vector_from_array
+from screwkin.trajectory import Trajectory
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+def walking_torques(robot: Robot, trajectory: Trajectory) -> Array:
+    """Torque (T, n) of every joint for the motion of a trajectory [N m, N for prismatic joints].
+
+    With shares s of the load and feet at a and b, the first foot gets the share s_a of the ground wrench,
+    moved by s_b (a - b), and the second the share s_b, moved by s_a (b - a): together the whole.
+
+    Raises:
+        InputError: other than two feet, or a sample in which none bears.
+    """
+    shares, batch = load_shares(trajectory), (trajectory.samples,)
+    bodies = Bodies.of(robot, pose_from_array(trajectory.T_world_base).R, unstack(trajectory.q))
+    ground, free = inverse_dynamics(
+        bodies,
+        unstack(trajectory.qd),
+        unstack(trajectory.qdd),
+        twist_from_array(trajectory.base_twist),
+        twist_from_array(trajectory.base_acceleration),
+        GRAVITY,
+    )
+    torque = np.array(as_array(free, batch))
+    places = [vector_from_array(trajectory.T_world_tip[foot][:, :3, 3]) for foot in trajectory.feet]
+    for i, foot in enumerate(trajectory.feet):
+        away = (places[i] - places[1 - i]) * shares[:, 1 - i]
+        borne = Wrench(ground.m + cross(away, ground.f), ground.f) * shares[:, i]
+        for j in robot.path_to(robot.limb(foot).link):
+            torque[:, j] -= as_array(power(borne, bodies.twists[j]), batch)
+    return torque
