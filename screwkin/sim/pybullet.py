@@ -50,7 +50,7 @@ class Physics:
     velocity_gain: float = 1.0
     gravity: float = 9.81
     sole_stiffness: float | None = None
-    sole_damping: float = 100.0
+    sole_damping: float = 20.0
 
 
 @dataclass(frozen=True, eq=False)
