@@ -1,0 +1,196 @@
+"""What compensation is worth on elastic servos: a walk with and without it, under several conditions.
+
+A single run proves little, for contact is chaotic: the same walk is played for every friction and every time
+step, and what counts is the median and the range of the largest ZMP error. A run that falls has no largest
+error; it is counted as fallen and enters no average.
+
+Source: paper B, table 7; docs/papers.md tells what is read into it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+
+from screwkin.dynamics.springs import StiffnessChoice
+from screwkin.errors import InputError
+from screwkin.gait.compensation import Method, Model, compensate
+from screwkin.model.robot import Robot
+from screwkin.sim.compliant import STEP, Compliance, CompliantBackend
+from screwkin.sim.measure import zmp_record
+from screwkin.sim.pybullet import Physics
+from screwkin.sim.run import Schedule, simulate
+from screwkin.trajectory import Trajectory
+
+Treatment = Literal["none", "swing", "joint", "dynamic"]
+TREATMENTS: tuple[Treatment, ...] = ("none", "swing", "joint", "dynamic")
+CHOICES: Mapping[Treatment, tuple[Method, Model]] = {
+    "swing": ("swing", "linear"),
+    "joint": ("joint", "linear"),
+    "dynamic": ("joint", "dynamic"),
+}
+"""Method and model of ``compensate`` behind each treatment; ``none`` plays the plan itself."""
+
+Pair = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Under which a walk is repeated: every friction with every time step [s].
+
+    joint_damping [N m s/rad]; rotor_inertia [kg m^2]; sole_stiffness [N/m] and sole_damping [N s/m] of every
+    point of contact, None for rigid soles; schedule: settling, holding, and when a fall is a fall.
+    """
+
+    frictions: tuple[float, ...] = (0.8, 1.0)
+    steps: tuple[float, ...] = (STEP, 0.8 * STEP)
+    joint_damping: float = 1.0
+    rotor_inertia: float = 5e-4
+    sole_stiffness: float | None = None
+    sole_damping: float = 20.0
+    schedule: Schedule = field(default_factory=lambda: Schedule(aftermath=0.0))
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One run: time of its fall [s] or None; largest |x| and |y| error of the ZMP [mm], up to a fall."""
+
+    treatment: Treatment
+    friction: float
+    dt: float
+    fell_at: float | None
+    zmp_max_mm: Pair
+
+
+@dataclass(frozen=True)
+class StudyRow:
+    """A treatment over all conditions; lengths in mm, x and y, of the runs that did not fall.
+
+    median_mm and range_mm (least, greatest; x, then y): of the largest ZMP error; None if all runs fell. cut:
+    by which share the medians are below those without compensation; None if either has none.
+    """
+
+    treatment: Treatment
+    runs: int
+    fallen: int
+    median_mm: Pair | None
+    range_mm: tuple[Pair, Pair] | None
+    cut: Pair | None
+    trials: tuple[Trial, ...]
+
+
+def compliance_study(
+    robot: Robot,
+    trajectory: Trajectory,
+    stiffness: StiffnessChoice = None,
+    treatments: Sequence[Treatment] = TREATMENTS,
+    conditions: Conditions | None = None,
+    *,
+    passes: int = 1,
+    progress: Callable[[float], None] | None = None,
+) -> tuple[StudyRow, ...]:
+    """Largest error of the contact ZMP against the planned one, with and without compensation.
+
+    Args:
+        robot: of which the trajectory speaks.
+        trajectory: the intended walk, not compensated yet.
+        stiffness: of the joints, in the simulation and for the compensation; see ``joint_stiffness``.
+        treatments: ``none``; ``swing`` and ``joint``, by statics; ``dynamic``: joints by the walk's torques.
+        conditions: what is varied, and what else yields.
+        passes: of the compensation.
+        progress: called now and then with the share done.
+
+    Returns:
+        One row per treatment.
+
+    Raises:
+        MissingDependencyError: pybullet is not installed. Others as of ``compensate`` and
+        ``CompliantBackend``.
+    """
+    if "compensation" in trajectory.meta:
+        raise InputError("the trajectory is compensated already; give the walk as it was planned")
+    unknown = [name for name in treatments if name not in TREATMENTS]
+    if unknown or not treatments:
+        found = f"unknown treatment {unknown[0]!r}" if unknown else "no treatment"
+        raise InputError(f"{found}; valid: {', '.join(TREATMENTS)}")
+    given = conditions or Conditions()
+    cases = [(friction, dt) for friction in given.frictions for dt in given.steps]
+    if not cases:
+        raise InputError("no conditions; give at least one friction and one time step")
+    trials: list[Trial] = []
+    total = len(treatments) * len(cases)
+    for treatment in treatments:
+        told = trajectory
+        if treatment != "none":
+            method, model = CHOICES[treatment]
+            told = compensate(robot, trajectory, stiffness, method, passes, model)
+        for friction, dt in cases:
+            trials.append(_trial(robot, told, stiffness, treatment, friction, dt, given))
+            if progress is not None:
+                progress(len(trials) / total)
+    return summarised(trials)
+
+
+def summarised(trials: Sequence[Trial]) -> tuple[StudyRow, ...]:
+    """One row per treatment, in the order in which they first appear."""
+    rows: list[StudyRow] = []
+    names = list(dict.fromkeys(trial.treatment for trial in trials))
+    medians = {name: _median(_stood(trials, name)) for name in names}
+    for name in names:
+        own = tuple(trial for trial in trials if trial.treatment == name)
+        errors = _stood(trials, name)
+        x, y = errors.T
+        span = ((float(x.min()), float(x.max())), (float(y.min()), float(y.max()))) if len(errors) else None
+        cut = _cut(medians[name], medians.get("none"))
+        rows.append(StudyRow(name, len(own), len(own) - len(errors), medians[name], span, cut, own))
+    return tuple(rows)
+
+
+def _trial(
+    robot: Robot,
+    told: Trajectory,
+    stiffness: StiffnessChoice,
+    treatment: Treatment,
+    friction: float,
+    dt: float,
+    given: Conditions,
+) -> Trial:
+    """One run from settling to the end, or to its fall."""
+    physics = Physics(
+        dt=dt, friction=friction, sole_stiffness=given.sole_stiffness, sole_damping=given.sole_damping
+    )
+    yields = Compliance(stiffness, given.joint_damping, given.rotor_inertia)
+    backend = CompliantBackend(robot, yields, physics)
+    try:
+        run = simulate(robot, told, backend, given.schedule)
+    finally:
+        backend.close()
+    zmp = zmp_record(run, told)
+    error = 1e3 * np.abs(zmp.contact - zmp.planned)
+    error = error[np.isfinite(error).all(axis=1)]
+    x, y = error.max(axis=0).tolist() if len(error) else (np.nan, np.nan)
+    return Trial(treatment, friction, dt, run.fallen_at, (x, y))
+
+
+def _stood(
+    trials: Sequence[Trial], treatment: Treatment
+) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    """Largest errors (m, 2) of the runs that did not fall."""
+    kept = [trial.zmp_max_mm for trial in trials if trial.treatment == treatment and trial.fell_at is None]
+    return np.array(kept, dtype=float).reshape(-1, 2)
+
+
+def _median(errors: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> Pair | None:
+    if not len(errors):
+        return None
+    x, y = np.median(errors, axis=0).tolist()
+    return (x, y)
+
+
+def _cut(after: Pair | None, before: Pair | None) -> Pair | None:
+    if after is None or before is None:
+        return None
+    return (1.0 - after[0] / before[0], 1.0 - after[1] / before[1])
