@@ -1,0 +1,283 @@
+"""Servo models as data: registers, units, and the pair of functions between SI and what a register holds.
+
+A model is one file under ``registers/``. The names of registers are the same for all models, whatever the
+maker calls them, so that the same code drives each. Ticks, speed units and load units occur only here and in
+what stands on the bus; everything above is in rad, rad/s and shares of the greatest torque.
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.resources import files
+from types import MappingProxyType
+from typing import Any, Literal
+
+from screwkin.errors import InputError, UnknownNameError
+
+Unit = Literal["", "tick", "speed", "load", "pwm", "0.1V", "degC", "2us", "ms"]
+Sign = Literal["none", "bit-10", "twos"]
+
+NO_SPEED_LIMIT = 0
+"""What ``moving_speed`` holds when the servo may go as fast as it can."""
+
+_RPM = 2 * math.pi / 60  # rad/s
+_DIVISOR_CLOCK = 2_000_000
+_PWM_UNIT = 1 / 885
+_UNITS: Mapping[str, float] = {"0.1V": 0.1, "degC": 1.0, "2us": 2e-6, "ms": 1e-3, "pwm": _PWM_UNIT, "": 1.0}
+
+
+@dataclass(frozen=True)
+class Register:
+    """A place of the register table: ``width`` bytes at ``address``, the low byte first.
+
+    ``low`` and ``high`` bound the value (after its sign is decoded); ``sign`` tells how negative values are
+    written: not at all, by bit 10, or as two's complement.
+    """
+
+    name: str
+    address: int
+    width: int
+    access: Literal["r", "rw"] = "rw"
+    unit: Unit = ""
+    low: int = 0
+    high: int = 0
+    initial: int = 0
+    sign: Sign = "none"
+
+    @property
+    def end(self) -> int:
+        """The address after its last byte."""
+        return self.address + self.width
+
+
+@dataclass(frozen=True)
+class Profile:
+    """A servo model. Angles are measured from the servo's centre, positive towards greater ticks.
+
+    ``number`` is what its ``model_number`` register holds, 0 where nobody has told.
+
+    ``range_deg / ticks`` is one tick; the greatest tick is ``ticks - 1``. Speed unit in rad/s, load unit as a
+    share of the greatest torque, no-load speed in rad/s, stall torque in N m, nominal voltage in V.
+    """
+
+    model: str
+    number: int
+    protocol: float
+    ticks: int
+    range_deg: float
+    centre: int
+    speed_unit: float
+    load_unit: float
+    no_load_speed: float
+    stall_torque: float
+    voltage: float
+    has_sync_read: bool
+    has_bulk_read: bool
+    verified: bool
+    ram_begins: int
+    baud_table: tuple[int, ...]
+    registers: Mapping[str, Register]
+    aliases: tuple[str, ...] = field(default=())
+
+    @property
+    def tick(self) -> float:
+        """One tick [rad]."""
+        return math.radians(self.range_deg) / self.ticks
+
+    @property
+    def lower(self) -> float:
+        """The least angle from the centre that a goal can hold [rad]."""
+        return (0 - self.centre) * self.tick
+
+    @property
+    def upper(self) -> float:
+        """The greatest angle from the centre that a goal can hold [rad]."""
+        return (self.ticks - 1 - self.centre) * self.tick
+
+    @property
+    def size(self) -> int:
+        """Bytes of the register table."""
+        return max(register.end for register in self.registers.values())
+
+    def register(self, name: str) -> Register:
+        """The register of that name.
+
+        Raises:
+            UnknownNameError: this model has none.
+        """
+        if name not in self.registers:
+            raise UnknownNameError(f"register of {self.model}", name, tuple(self.registers))
+        return self.registers[name]
+
+
+@cache
+def profile_models() -> tuple[str, ...]:
+    """Models that have a profile."""
+    return tuple(profile.model for profile in _profiles())
+
+
+def load_profile(model: str) -> Profile:
+    """The profile of a servo model; case and the maker's aliases do not matter.
+
+    Raises:
+        UnknownNameError: there is no such model; the message lists those there are.
+    """
+    wanted = model.strip().lower()
+    for profile in _profiles():
+        if wanted in {name.lower() for name in (profile.model, *profile.aliases)}:
+            return profile
+    raise UnknownNameError("servo model", model, profile_models())
+
+
+def ticks_from_radians(profile: Profile, angle: float) -> int:
+    """The position register for an angle from the servo's centre [rad], rounded to the nearest tick.
+
+    Raises:
+        InputError: no number, or outside what the servo can turn.
+    """
+    if not math.isfinite(angle):
+        raise InputError(f"an angle for a {profile.model} is {angle!r}; give a finite number in rad")
+    ticks = round(angle / profile.tick) + profile.centre
+    if not 0 <= ticks < profile.ticks:
+        raise InputError(
+            f"angle {angle:.4f} rad ({math.degrees(angle):.2f} deg, tick {ticks}) is outside the range of a "
+            f"{profile.model}: {profile.lower:.4f} to {profile.upper:.4f} rad from its centre "
+            f"(ticks 0 to {profile.ticks - 1})"
+        )
+    return ticks
+
+
+def radians_from_ticks(profile: Profile, ticks: int) -> float:
+    """The angle from the servo's centre [rad] of a position; readings may lie beyond the range of goals."""
+    return (ticks - profile.centre) * profile.tick
+
+
+def speed_from_rate(profile: Profile, rate: float) -> int:
+    """The speed register for a speed limit [rad/s], rounded to the nearest unit, at least 1.
+
+    A register of 0 means no limit, so a small rate gives 1 and a rate of 0 is refused; who wants no limit
+    writes ``NO_SPEED_LIMIT``.
+
+    Raises:
+        InputError: no number, not positive, or above what the register can hold.
+    """
+    if not (math.isfinite(rate) and rate > 0):
+        raise InputError(
+            f"a speed limit for a {profile.model} is {rate!r} rad/s; give a positive number "
+            "(0 would mean no limit)"
+        )
+    speed = max(1, round(rate / profile.speed_unit))
+    high = profile.register("moving_speed").high
+    if speed > high:
+        raise InputError(
+            f"speed limit {rate:.4g} rad/s ({speed} units) is outside the range of a {profile.model}: "
+            f"{profile.speed_unit:.4g} to {high * profile.speed_unit:.4g} rad/s (1 to {high} units)"
+        )
+    return speed
+
+
+def rate_from_speed(profile: Profile, speed: int) -> float:
+    """The rate [rad/s] of a speed in units, sign decoded (see ``decode``)."""
+    return speed * profile.speed_unit
+
+
+def decode(register: Register, raw: int) -> int:
+    """The value of what a register holds on the bus, its sign decoded.
+
+    On servos with bit 10 as direction, the bit stands for clockwise: towards smaller ticks, negative here.
+    """
+    if register.sign == "bit-10":
+        return -(raw & 0x3FF) if raw & 0x400 else raw & 0x3FF
+    if register.sign == "twos" and raw >= 1 << (8 * register.width - 1):
+        return raw - (1 << (8 * register.width))
+    return raw
+
+
+def encode(register: Register, value: int) -> int:
+    """What a register holds on the bus for a value: the inverse of ``decode``.
+
+    Raises:
+        InputError: outside the register's range.
+    """
+    low = -0x3FF if register.sign == "bit-10" else register.low
+    high = 0x3FF if register.sign == "bit-10" else register.high
+    if not low <= value <= high:
+        raise InputError(f"register {register.name} cannot hold {value}; its range is {low} to {high}")
+    if register.sign == "bit-10":
+        return 0x400 | -value if value < 0 else value
+    return value % (1 << (8 * register.width))
+
+
+def physical(profile: Profile, name: str, raw: int) -> float:
+    """What a register holds on the bus, in rad, rad/s, share of the greatest torque, V, s, degrees Celsius.
+
+    Raises:
+        UnknownNameError: the model has no such register.
+    """
+    register = profile.register(name)
+    value = decode(register, raw)
+    if register.unit == "tick":
+        return radians_from_ticks(profile, value) if name.endswith("position") else value * profile.tick
+    if register.unit == "speed":
+        return rate_from_speed(profile, value)
+    if register.unit == "load":
+        return value * profile.load_unit
+    return value * _UNITS[register.unit]
+
+
+def baud_from_register(profile: Profile, value: int) -> int:
+    """The baud rate that a ``baud_rate`` register stands for.
+
+    Raises:
+        InputError: the model does not know the value.
+    """
+    if not profile.baud_table:
+        return _DIVISOR_CLOCK // (value + 1)
+    if not 0 <= value < len(profile.baud_table):
+        raise InputError(f"{profile.model} knows no baud rate {value}; 0 to {len(profile.baud_table) - 1}")
+    return profile.baud_table[value]
+
+
+def register_from_baud(profile: Profile, baud: int) -> int:
+    """The ``baud_rate`` register whose rate is within 3 % of ``baud``: what both ends of a line tolerate.
+
+    Raises:
+        InputError: the model has none.
+    """
+    values = range(len(profile.baud_table) or profile.register("baud_rate").high + 1)
+    best = min(values, key=lambda value: abs(baud_from_register(profile, value) - baud))
+    nearest = baud_from_register(profile, best)
+    if abs(nearest - baud) > 0.03 * baud:
+        raise InputError(f"a {profile.model} cannot talk at {baud} baud; nearest is {nearest}")
+    return best
+
+
+@cache
+def _profiles() -> tuple[Profile, ...]:
+    folder = files("screwkin.servo") / "registers"
+    texts = {
+        entry.name: entry.read_text("utf-8") for entry in folder.iterdir() if entry.name.endswith(".toml")
+    }
+    return tuple(_profile(tomllib.loads(texts[name])) for name in sorted(texts))
+
+
+def _profile(data: dict[str, Any]) -> Profile:
+    data = dict(data)
+    registers = {name: _register(name, row) for name, row in data.pop("registers").items()}
+    data.pop("baud")
+    return Profile(
+        speed_unit=data.pop("speed_unit_rpm") * _RPM,
+        no_load_speed=data.pop("no_load_rpm") * _RPM,
+        aliases=tuple(data.pop("aliases")),
+        baud_table=tuple(data.pop("baud_table", ())),
+        registers=MappingProxyType(registers),
+        **data,
+    )
+
+
+def _register(name: str, row: Mapping[str, Any]) -> Register:
+    return Register(name, **{"high": (1 << (8 * row["width"])) - 1, **row})

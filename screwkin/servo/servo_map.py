@@ -1,0 +1,247 @@
+"""Which servo drives which joint: ids, directions and zero offsets of ``[servos]`` in a robot's table.
+
+    [servos]
+    model = "AX-12A"            # of all servos; models = { elbow = "MX-28" } for those that differ
+    protocol = 1.0              # may be left out: the model has one
+    baud = 1000000
+    ids = { hip = 7, knee = 8 }
+    direction = { knee = -1 }   # -1 where the joint's positive sense is that of falling ticks; default 1
+    zero = { hip = 0.012 }      # angle of the servo from its centre, with the joint at 0 [rad]; default 0
+    range_deg = 300.0           # of all servos: overrides the model's, where a tick was measured
+
+servo angle = direction * joint angle + zero.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from screwkin.errors import Fault, InputError, TableError, UnknownNameError
+from screwkin.model.robot import Robot
+from screwkin.servo.profiles import (
+    Profile,
+    load_profile,
+    profile_models,
+    radians_from_ticks,
+    register_from_baud,
+    ticks_from_radians,
+)
+
+KEYS = ("model", "models", "protocol", "baud", "ids", "direction", "zero", "range_deg", "stiffness")
+DEFAULT_BAUD = 1_000_000
+
+
+@dataclass(frozen=True)
+class ServoJoint:
+    """The servo of a joint: bus id, direction (1 or -1), zero offset [rad], profile."""
+
+    joint: str
+    id: int
+    direction: int
+    zero: float
+    profile: Profile
+
+    def ticks_from_angle(self, angle: float) -> int:
+        """The position register for a joint angle [rad].
+
+        Raises:
+            InputError: outside what the servo can turn; the message names the joint.
+        """
+        try:
+            return ticks_from_radians(self.profile, self.direction * angle + self.zero)
+        except InputError as error:
+            raise InputError(f"joint {self.joint} (servo {self.id}) at {angle:.4f} rad: {error}") from None
+
+    def angle_from_ticks(self, ticks: int) -> float:
+        """The joint angle [rad] that a position register stands for."""
+        return self.direction * (radians_from_ticks(self.profile, ticks) - self.zero)
+
+    @property
+    def lower(self) -> float:
+        """The least joint angle that the servo can be told [rad]."""
+        ends = (self.profile.lower, self.profile.upper)
+        return min(self.direction * (end - self.zero) for end in ends)
+
+    @property
+    def upper(self) -> float:
+        """The greatest joint angle that the servo can be told [rad]."""
+        ends = (self.profile.lower, self.profile.upper)
+        return max(self.direction * (end - self.zero) for end in ends)
+
+
+@dataclass(frozen=True)
+class ServoMap:
+    """The servos of a robot in the order of its joints, all on one bus."""
+
+    robot: str
+    protocol: float
+    baud: int
+    joints: tuple[ServoJoint, ...]
+
+    @classmethod
+    def of(cls, robot: Robot) -> ServoMap:
+        """Read ``[servos]`` of a robot's table.
+
+        Raises:
+            TableError: every fault of the section at once, each with the key and what would be right.
+        """
+        faults, profiles = list(_faults(robot.joint_names, robot.servos)), {}
+        for joint in robot.joint_names:
+            try:
+                profiles[joint] = _profile_of(robot.servos, joint)
+            except UnknownNameError:
+                continue  # told among the faults
+        if len(protocols := {profile.protocol for profile in profiles.values()}) > 1:
+            fix = "Servos of one bus speak one protocol: change the models, or their firmware"
+            faults.append(Fault("[servos]", "models", f"speak protocols {sorted(protocols)}", fix))
+        faults += _line_faults(robot.servos, profiles.values())
+        if faults:
+            raise TableError(robot.path or robot.name, faults)
+        s = robot.servos
+        joints = tuple(
+            ServoJoint(
+                name,
+                s["ids"][name],
+                int(s.get("direction", {}).get(name, 1)),
+                float(s.get("zero", {}).get(name, 0.0)),
+                profiles[name],
+            )
+            for name in robot.joint_names
+        )
+        return cls(robot.name, protocols.pop(), int(s.get("baud", DEFAULT_BAUD)), joints)
+
+    @property
+    def ids(self) -> tuple[int, ...]:
+        """Bus ids in the order of the joints."""
+        return tuple(servo.id for servo in self.joints)
+
+    def joint(self, name: str) -> ServoJoint:
+        """The servo of a joint.
+
+        Raises:
+            UnknownNameError: no such joint.
+        """
+        for servo in self.joints:
+            if servo.joint == name:
+                return servo
+        raise UnknownNameError("joint", name, tuple(servo.joint for servo in self.joints))
+
+    def by_id(self, servo_id: int) -> ServoJoint:
+        """The servo that bears an id.
+
+        Raises:
+            UnknownNameError: none does.
+        """
+        for servo in self.joints:
+            if servo.id == servo_id:
+                return servo
+        raise UnknownNameError("servo id", str(servo_id), tuple(map(str, self.ids)))
+
+
+def _profile_of(servos: Mapping[str, Any], joint: str) -> Profile:
+    models = servos.get("models")
+    model = models.get(joint, servos.get("model")) if isinstance(models, Mapping) else servos.get("model")
+    profile = load_profile(str(model))
+    degrees: Any = servos.get("range_deg")
+    return replace(profile, range_deg=float(degrees)) if _is_number(degrees) else profile
+
+
+def _faults(names: tuple[str, ...], servos: Mapping[str, Any]) -> Iterator[Fault]:
+    """Faults of the section's own keys and values."""
+    if not servos:
+        yield Fault("[servos]", "", "is missing", "Write at least model and ids there")
+        return
+    for key in servos:
+        if key not in KEYS:
+            yield Fault("[servos]", key, "is unknown", f"Known are {', '.join(KEYS)}")
+    models = {key: servos.get(key, default) for key, default in (("models", {}), ("model", None))}
+    told = [("model", models["model"])] if models["model"] is not None or not models["models"] else []
+    if isinstance(models["models"], Mapping):
+        told += [(f"models.{joint}", model) for joint, model in models["models"].items()]
+    for key, model in told:
+        if not isinstance(model, str) or not _known(model):
+            found = "is missing" if model is None else f"{model!r} is unknown"
+            yield Fault("[servos]", key, found, f"Known are {', '.join(profile_models())}")
+    for key in ("models", "ids", "direction", "zero"):
+        table = servos.get(key, {})
+        if not isinstance(table, Mapping):
+            fix = f"Write {key} = {{ JOINT = VALUE, … }}"
+            yield Fault("[servos]", key, f"{table!r} is no table", fix)
+        else:
+            yield from (
+                Fault("[servos]", f"{key}.{joint}", "is no joint", f"Joints are {', '.join(names)}")
+                for joint in table
+                if joint not in names
+            )
+            yield from _CHECKS[key](names, table)
+    degrees = servos.get("range_deg", 300.0)
+    if not (_is_number(degrees) and 0 < degrees <= 360):
+        yield Fault("[servos]", "range_deg", f"is {degrees!r}", "Write a number of degrees up to 360")
+
+
+def _id_faults(names: tuple[str, ...], ids: Mapping[str, Any]) -> Iterator[Fault]:
+    bearers: dict[Any, list[str]] = {}
+    for joint, number in ids.items():
+        if not (isinstance(number, int) and not isinstance(number, bool) and 0 <= number <= 252):
+            yield Fault("[servos]", f"ids.{joint}", f"is {number!r}", "Write an integer from 0 to 252")
+        else:
+            bearers.setdefault(number, []).append(joint)
+    for number, joints in bearers.items():
+        if len(joints) > 1:
+            found = f"{number} is given to {', '.join(joints)}"
+            yield Fault("[servos]", "ids", found, "Give every servo an id of its own")
+    if missing := [name for name in names if name not in ids]:
+        yield Fault("[servos]", "ids", f"has none for {', '.join(missing)}", "Give every joint an id")
+
+
+def _direction_faults(names: tuple[str, ...], table: Mapping[str, Any]) -> Iterator[Fault]:
+    for joint, value in table.items():
+        if not _is_number(value) or value not in (1, -1):
+            yield Fault("[servos]", f"direction.{joint}", f"is {value!r}", "Write 1 or -1")
+
+
+def _zero_faults(names: tuple[str, ...], table: Mapping[str, Any]) -> Iterator[Fault]:
+    for joint, value in table.items():
+        if not (_is_number(value) and abs(value) <= math.pi):
+            yield Fault("[servos]", f"zero.{joint}", f"is {value!r}", "Write an angle in rad, -pi to pi")
+
+
+def _line_faults(servos: Mapping[str, Any], profiles: Any) -> Iterator[Fault]:
+    """Faults of protocol and baud against what the models can do."""
+    protocol, baud = servos.get("protocol"), servos.get("baud", DEFAULT_BAUD)
+    kinds = {profile.model: profile for profile in profiles}.values()
+    for profile in kinds:
+        if protocol is not None and protocol != profile.protocol:
+            found = f"is {protocol!r}, but a {profile.model} speaks {profile.protocol}"
+            yield Fault("[servos]", "protocol", found, "Leave it out, or name the model with that firmware")
+    if not (isinstance(baud, int) and not isinstance(baud, bool) and baud > 0):
+        yield Fault("[servos]", "baud", f"is {baud!r}", "Write an integer, such as 1000000")
+        return
+    for profile in kinds:
+        try:
+            register_from_baud(profile, baud)
+        except InputError as error:
+            yield Fault("[servos]", "baud", str(error), "Write a rate that all servos have")
+
+
+def _known(model: str) -> bool:
+    try:
+        load_profile(model)
+    except UnknownNameError:
+        return False
+    return True
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+_CHECKS: Mapping[str, Any] = {
+    "models": lambda names, table: (),
+    "ids": _id_faults,
+    "direction": _direction_faults,
+    "zero": _zero_faults,
+}
