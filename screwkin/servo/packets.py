@@ -1,0 +1,112 @@
+"""What goes over a servo bus, as a servo sees it: packets, and what a packet asks of the servo that reads it.
+
+The layout of the bytes is in ``protocol1`` and ``protocol2``; both hold the same functions:
+
+    pack(packet) -> bytes                        a packet as bytes
+    status(id, error, data) -> bytes             a servo's answer as bytes
+    parse(buffer, ended) -> (packets, rest)      the sound packets of a stream, and what may become one
+    command_for(packet, id) -> Command or None   what a packet asks of the servo of that id
+
+They share nothing with the makers' driver, so that each tests the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Literal
+
+BROADCAST = 0xFE
+
+Kind = Literal[
+    "ping", "read", "write", "register", "action", "factory reset", "reboot", "unknown", "malformed"
+]
+
+
+class Instruction(IntEnum):
+    """The instruction byte; ``STATUS`` only on protocol 2.0, where answers bear it."""
+
+    PING = 0x01
+    READ = 0x02
+    WRITE = 0x03
+    REG_WRITE = 0x04
+    ACTION = 0x05
+    FACTORY_RESET = 0x06
+    REBOOT = 0x08
+    STATUS = 0x55
+    SYNC_READ = 0x82
+    SYNC_WRITE = 0x83
+    BULK_READ = 0x92
+    BULK_WRITE = 0x93
+
+
+@dataclass(frozen=True)
+class Packet:
+    """A sound packet: whom it concerns, its instruction (on protocol 1.0 an answer's error byte), rest."""
+
+    id: int
+    instruction: int
+    params: bytes = b""
+
+
+@dataclass(frozen=True)
+class Command:
+    """What one servo is asked: ``length`` bytes to read, ``data`` to write, at ``address``.
+
+    ``answers`` says whether an answer may be given at all, whatever the servo's status level; ``after`` names
+    the servos whose answers come before its own.
+    """
+
+    kind: Kind
+    address: int = 0
+    length: int = 0
+    data: bytes = b""
+    answers: bool = True
+    after: tuple[int, ...] = ()
+
+
+def simple_command(packet: Packet, address_width: int) -> Command:
+    """What an instruction to one servo, or to all alike, asks: all but the sync and bulk ones."""
+    answers, params = packet.id != BROADCAST, packet.params
+    address = int.from_bytes(params[:address_width], "little")
+    match packet.instruction:
+        case Instruction.PING:
+            return Command("ping", answers=answers)
+        case Instruction.READ if len(params) == 2 * address_width:
+            length = int.from_bytes(params[address_width:], "little")
+            return Command("read", address, length, answers=answers)
+        case Instruction.WRITE if len(params) > address_width:
+            return Command("write", address, data=params[address_width:], answers=answers)
+        case Instruction.REG_WRITE if len(params) > address_width:
+            return Command("register", address, data=params[address_width:], answers=answers)
+        case Instruction.ACTION:
+            return Command("action", answers=answers)
+        case Instruction.FACTORY_RESET:
+            return Command("factory reset", answers=answers)
+        case Instruction.REBOOT if address_width == 2:
+            return Command("reboot", answers=answers)
+        case Instruction.READ | Instruction.WRITE | Instruction.REG_WRITE:
+            return Command("malformed", answers=answers)
+    return Command("unknown", answers=answers)
+
+
+def rows(params: bytes, size: int) -> list[bytes] | None:
+    """Parameters cut into rows of ``size`` bytes; None if they do not fit."""
+    if size <= 0 or len(params) % size:
+        return None
+    return [params[i : i + size] for i in range(0, len(params), size)]
+
+
+def sync_write_command(head: bytes, body: bytes, id: int, width: int) -> Command | None:
+    """What a sync write asks of a servo: ``head`` holds address and length, ``body`` rows of id and data."""
+    address, length = int.from_bytes(head[:width], "little"), int.from_bytes(head[width:], "little")
+    for row in rows(body, length + 1) or ():
+        if row[0] == id and length:
+            return Command("write", address, data=row[1:], answers=False)
+    return None
+
+
+def turn(ids: Sequence[int], id: int) -> tuple[int, ...] | None:
+    """The ids before ``id``; None if it is not among them."""
+    return tuple(ids[: ids.index(id)]) if id in ids else None

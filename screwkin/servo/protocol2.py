@@ -1,0 +1,139 @@
+"""Protocol 2.0 as a servo sees it.
+
+    +----+----+----+----+----+-------+-------+-------+-------------------+-------+-------+
+    | FF | FF | FD | 00 | id | len L | len H | instr | params …          | crc L | crc H |   an instruction
+    +----+----+----+----+----+-------+-------+-------+-------------------+-------+-------+
+    | FF | FF | FD | 00 | id | len L | len H |  55   | error | data …    | crc L | crc H |   an answer
+    +----+----+----+----+----+-------+-------+-------+-------------------+-------+-------+
+
+len counts instr, params and crc. Where FF FF FD occurs in instr and params, one more FD is written after it
+("stuffing", counted by len). crc is CRC-16 with polynomial 8005, begun with 0, not reflected, over all that
+stands before.
+id FE is everyone. error: 1 fail, 2 instruction, 3 crc, 4 range, 5 length, 6 limit, 7 access; bit 7 is set
+while the servo's hardware error register is not 0.
+
+Source: the maker's description of protocol 2.0.
+"""
+
+from __future__ import annotations
+
+from screwkin.servo.packets import (
+    BROADCAST,
+    Command,
+    Instruction,
+    Packet,
+    rows,
+    simple_command,
+    sync_write_command,
+    turn,
+)
+
+MOST = 1024
+"""Bytes that ``len`` may count: servos have no room for more, so a greater length is noise."""
+
+_HEADER = b"\xff\xff\xfd\x00"
+_OVERHEAD = 7  # header, id, len
+_LEAST = 3  # instruction, crc
+_PATTERN, _STUFFED = b"\xff\xff\xfd", b"\xff\xff\xfd\xfd"
+_POLYNOMIAL = 0x8005
+
+
+def _crc_row(byte: int) -> int:
+    register = byte << 8
+    for _ in range(8):
+        register = (register << 1) ^ (_POLYNOMIAL if register & 0x8000 else 0)
+    return register & 0xFFFF
+
+
+_CRC = tuple(map(_crc_row, range(256)))
+
+
+def crc16(data: bytes) -> int:
+    """CRC-16 with polynomial 8005, begun with 0, not reflected."""
+    register = 0
+    for byte in data:
+        register = (register << 8 & 0xFF00) ^ _CRC[register >> 8 ^ byte]
+    return register
+
+
+def pack(packet: Packet) -> bytes:
+    """A packet as bytes."""
+    body = (bytes((packet.instruction,)) + packet.params).replace(_PATTERN, _STUFFED)
+    told = _HEADER + bytes((packet.id,)) + (len(body) + 2).to_bytes(2, "little") + body
+    return told + crc16(told).to_bytes(2, "little")
+
+
+def status(id: int, error: int, data: bytes = b"") -> bytes:
+    """A servo's answer as bytes."""
+    return pack(Packet(id, Instruction.STATUS, bytes((error,)) + data))
+
+
+def parse(buffer: bytes, ended: bool = False) -> tuple[list[Packet], bytes]:
+    """The sound packets of a stream, in order, and the rest that may become one with more bytes.
+
+    Where a packet proves false, the search goes on one byte behind its beginning, so that a false header or a
+    lost byte costs no packet that follows. A false length may hold up what follows until so many bytes are
+    there (at most 1031) or the line has fallen silent: then pass ``ended``, and nothing is waited for any more.
+    """
+    data = bytes(buffer)
+    packets: list[Packet] = []
+    end = 0  # of the last packet, or of what was passed over
+    while (i := data.find(_HEADER, end)) >= 0:
+        end = i + 1
+        length = int.from_bytes(data[i + 5 : i + 7], "little") if i + _OVERHEAD <= len(data) else _LEAST
+        whole = _OVERHEAD + length
+        if not _LEAST <= length <= MOST or data[i + 4 : i + 5] == b"\xff":
+            continue
+        if i + whole > len(data):
+            if not ended:
+                return packets, data[i:]
+        elif int.from_bytes(data[i + whole - 2 : i + whole], "little") == crc16(data[i : i + whole - 2]):
+            body = data[i + _OVERHEAD : i + whole - 2].replace(_STUFFED, _PATTERN)
+            packets.append(Packet(data[i + 4], body[0], body[1:]))
+            end = i + whole
+    return packets, b"" if ended else _beginning(data[end:])
+
+
+def _beginning(data: bytes) -> bytes:
+    """The longest end of the data that a header may begin with."""
+    return next((_HEADER[:n] for n in (3, 2, 1) if data.endswith(_HEADER[:n])), b"")
+
+
+def command_for(packet: Packet, id: int) -> Command | None:
+    """What a packet asks of the servo of that id; None if it is not concerned."""
+    params, everyone = packet.params, packet.id == BROADCAST
+    match packet.instruction:
+        case Instruction.STATUS:
+            return None
+        case Instruction.SYNC_WRITE:
+            return sync_write_command(params[:4], params[4:], id, width=2) if everyone else None
+        case Instruction.SYNC_READ:
+            before = turn(list(params[4:]), id)
+            if before is None or not everyone:
+                return None
+            return Command("read", _number(params[:2]), _number(params[2:4]), after=before)
+        case Instruction.BULK_READ:
+            wanted = {row[0]: row for row in rows(params, 5) or ()}
+            before = turn(list(wanted), id)
+            if before is None or not everyone:
+                return None
+            return Command("read", _number(wanted[id][1:3]), _number(wanted[id][3:5]), after=before)
+        case Instruction.BULK_WRITE:
+            return _bulk_write(params, id) if everyone else None
+        case Instruction.PING if everyone:
+            return Command("ping", after=tuple(range(id)))
+    return simple_command(packet, address_width=2) if packet.id in (id, BROADCAST) else None
+
+
+def _bulk_write(params: bytes, id: int) -> Command | None:
+    """Rows of id, address, length and as many bytes of data."""
+    while len(params) >= 5:
+        length = _number(params[3:5])
+        if params[0] == id and 0 < length <= len(params) - 5:
+            return Command("write", _number(params[1:3]), data=params[5 : 5 + length], answers=False)
+        params = params[5 + length :]
+    return None
+
+
+def _number(data: bytes) -> int:
+    return int.from_bytes(data, "little")
