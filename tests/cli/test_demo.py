@@ -76,5 +76,5 @@ def test_without_the_simulator_the_report_still_tells_the_rest(cli, monkeypatch,
 def test_a_robot_that_cannot_walk_is_refused(cli, refused, tmp_path):
     called = cli("demo", "linkages/four-bar")
     assert called.code == 2
-    assert "legs" in called.err
+    assert "fixed base" in called.err
     assert list(tmp_path.iterdir()) == []

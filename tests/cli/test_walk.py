@@ -118,7 +118,7 @@ def test_joints_faster_than_their_servos_are_a_warning(cli):
         (["bioloid", "--gait", "paper", "--set", "Tc=0.2"], 2, "Tc"),
         (["bioloid", "--set", "waist_height=0.2"], 3, "_leg, sample 0 (t = 0.000 s): out of reach by"),
         (["bioloid", "--set", "stride=0.5"], 3, "out of reach by"),
-        (["linkages/four-bar"], 2, "legs"),
+        (["linkages/four-bar"], 2, "fixed base"),
     ],
 )
 def test_what_cannot_be_walked_is_told_once_and_leaves_no_file(cli, refused, tmp_path, words, code, named):
