@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from screwkin.analysis import measures_table, measures_walk
+from screwkin.analysis import measures_leg, measures_springs, measures_table, measures_walk
 
 Measure = Callable[..., Any]
 """A number, a vector or a text."""
@@ -24,12 +24,23 @@ _ALL: tuple[Measure, ...] = (
     measures_table.reference_error,
     measures_table.mechanism,
     measures_table.comparison,
-    measures_table.dh_row,
+    measures_table.dh_angles,
+    measures_table.dh_lengths,
     measures_walk.key_points,
     measures_walk.feet_apart,
+    measures_walk.swing_height,
     measures_walk.balance,
     measures_walk.spike_phases,
     measures_walk.simulated,
+    measures_leg.ik,
+    measures_leg.ik_ratio,
+    measures_leg.reach,
+    measures_leg.cut_at,
+    measures_leg.deflection,
+    measures_leg.gains,
+    measures_leg.tracking,
+    measures_leg.compensation,
+    measures_springs.on_springs,
 )
 
 MEASURES: Mapping[str, Measure] = {measure.__name__: measure for measure in _ALL}

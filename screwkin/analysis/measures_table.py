@@ -12,6 +12,7 @@ from screwkin.analysis.chains import by_screws, chains_of
 from screwkin.analysis.compare import random_positions
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.kinematics.positions import screws_in
+from screwkin.model.dh import DHRow
 from screwkin.model.robot import Robot
 from screwkin.se3 import UNTURNED, Pose, Vector, as_array, vector_from_array
 
@@ -131,13 +132,23 @@ def comparison(bench: Bench, key: str, part: str = "", robot: str = "") -> float
     return value
 
 
-def dh_row(bench: Bench, joint: str, robot: str = "") -> Array:
-    """Row (4,) of the DH table beside the robot's file: alpha [rad], a [m], d [m], offset [rad]."""
-    for chain in chains_of(bench.robot(robot)):
-        for row in chain.table.rows:
-            if row.joint == joint:
-                return np.array([row.alpha, row.a, row.d, row.offset])
-    raise UnknownNameError("joint of a DH table", joint, bench.robot(robot).joint_names)
+def dh_angles(bench: Bench, joint: str, robot: str = "") -> Array:
+    """Angles alpha and offset (2,) [rad] of a joint in the DH table beside the robot's file."""
+    row = _dh_row(bench.robot(robot), joint)
+    return np.array([row.alpha, row.offset])
+
+
+def dh_lengths(bench: Bench, joint: str, robot: str = "") -> Array:
+    """Lengths a and d (2,) [m] of a joint in the DH table beside the robot's file."""
+    row = _dh_row(bench.robot(robot), joint)
+    return np.array([row.a, row.d])
+
+
+def _dh_row(robot: Robot, joint: str) -> DHRow:
+    rows = {row.joint: row for chain in chains_of(robot) for row in chain.table.rows}
+    if joint not in rows:
+        raise UnknownNameError("joint of a DH table", joint, list(rows))
+    return rows[joint]
 
 
 def _vector(v: Vector) -> Array:

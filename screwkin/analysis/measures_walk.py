@@ -69,6 +69,11 @@ def feet_apart(
     return float(np.ptp([_path(account, foot)[row, 0] for foot in account.trajectory.feet]))
 
 
+def swing_height(bench: Bench, gait: str, foot: str, steps: int | None = None, robot: str = "") -> float:
+    """How high a foot is lifted [m]."""
+    return float(_path(bench.account(gait, steps, robot), foot)[:, 2].max())
+
+
 def balance(
     bench: Bench, key: str, gait: str, steps: int | None = None, changes: Changes = None, robot: str = ""
 ) -> float:
@@ -150,6 +155,6 @@ BALANCE = {
     "com_height": lambda one: one.balance.com[:, 2].mean(),
     "waist_height": lambda one: _path(one, "base")[:, 2].mean(),
     "speed_use": lambda one: max(one.speed_use.values()),
-    "advance": lambda one: float(np.ptp(_path(one, "base")[:, 0])),
+    "advance": lambda one: _path(one, "base")[-1, 0] - _path(one, "base")[0, 0],
 }
 """Numbers of a walk by name."""

@@ -2,12 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
 
 from screwkin.analysis.bench import Bench
+from screwkin.analysis.measures_leg import compensated_of, map_of, sinking_of, zmp_lines
 from screwkin.errors import InputError
-from screwkin.report import balance, frames, motion
-from screwkin.report.style import Figure
+from screwkin.kinematics.positions import frame_pose, link_displacements
+from screwkin.report import balance, frames, maps, motion
+from screwkin.report.style import (
+    LINES,
+    MEASURED,
+    PLAIN,
+    SIDES,
+    ZMP,
+    Figure,
+    legend_above,
+    new_figure,
+    shade_swings,
+    shown,
+    time_axis,
+)
+from screwkin.se3 import as_array, unstack
 
 Drawing = Callable[..., Figure]
 
@@ -46,6 +63,11 @@ def walking(bench: Bench, gait: str, steps: int | None = None, robot: str = "") 
     return frames.frames_of_run(account, bench.validation(account).run)
 
 
+def planned(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
+    """Frames of the planned walk, from the side."""
+    return frames.frames_drawn(bench.account(gait, steps, robot))
+
+
 def zmp_along_x(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
     """GCoM and ZMP against time along x."""
     return balance.zmp_against_gcom(bench.account(gait, steps, robot), 0)
@@ -61,6 +83,90 @@ def seen_from_above(bench: Bench, gait: str, steps: int | None = None, robot: st
     return balance.seen_from_above(bench.account(gait, steps, robot))
 
 
+def reach_maps(
+    bench: Bench, limb: str, heights: Sequence[float], resolution: float = 0.0025, robot: str = ""
+) -> Figure:
+    """What cuts the reach, and the inverse condition number, at several heights."""
+    places = [map_of(bench, limb, height, resolution, robot) for height in heights]
+    most = max(float(np.nanmax(place.inverse_condition, initial=0.0)) for place in places)
+    return maps.workspace_overview(bench.robot(robot), places, most)
+
+
+def deflection_maps(
+    bench: Bench, limb: str, heights: Sequence[float], stiffness: float = 1.0, robot: str = ""
+) -> Figure:
+    """Length of the deflection at several heights."""
+    found = [sinking_of(bench, limb, height, stiffness, "linear", 0.005, robot) for height in heights]
+    return maps.deflection_overview(bench.robot(robot), found)
+
+
+def deflection_parts(
+    bench: Bench, limb: str, height: float, stiffness: float = 1.0, robot: str = ""
+) -> Figure:
+    """Components of the deflection at a height."""
+    found = sinking_of(bench, limb, height, stiffness, "linear", 0.005, robot)
+    return maps.deflection_picture(bench.robot(robot), found)
+
+
+def preview(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
+    """Wanted ZMP, that of the cart and of all links, and the CoM, along x and y."""
+    account = bench.account(gait, steps, robot)
+    wanted, cart, whole = zmp_lines(bench, gait, steps, robot)
+    figure, axes = new_figure(5.2, 2, sharex=True)
+    for k, one in enumerate(axes):
+        shade_swings(one, account)
+        time = account.trajectory.time
+        one.plot(time, 1e3 * cart[:, k], color=MEASURED, linewidth=3.0, alpha=0.6, label="ZMP of the cart")
+        one.plot(time, 1e3 * wanted[:, k], color="#222222", linewidth=0.9, label="ZMP wanted")
+        one.plot(time, 1e3 * whole[:, k], color=ZMP, linewidth=1.0, linestyle="--", label="ZMP of all links")
+        one.plot(time, 1e3 * account.balance.com[:, k], color=SIDES[2], label="CoM")
+        one.set_ylabel(f"{'xy'[k]} [mm]")
+    time_axis(axes[1], account)
+    legend_above(figure, list(axes), columns=6)
+    return figure
+
+
+def compensated_joints(bench: Bench, gait: str, limb: str, stiffness: float, robot: str = "") -> Figure:
+    """Joint angles of a limb as intended, and what compensation adds to them."""
+    account = bench.account(gait, None, robot)
+    table, time = account.robot, account.trajectory.time
+    change = np.degrees(compensated_of(bench, gait, stiffness, "swing", robot).q - account.trajectory.q)
+    figure, (angle, added) = new_figure(5.2, 2, sharex=True)
+    for k, i in enumerate(table.path_to(table.limb(limb).link)):
+        style = {"color": SIDES[k % len(SIDES)], "linestyle": LINES[k % 2], "linewidth": 1.2}
+        name = shown(table.joint_names[i])
+        angle.plot(time, np.degrees(account.trajectory.q[:, i]), label=name, **style)
+        added.plot(time, change[:, i], label=name, **style)
+    for one in (angle, added):
+        shade_swings(one, account)
+    angle.set_ylabel("intended [deg]")
+    added.set_ylabel("added by compensation [deg]")
+    time_axis(added, account)
+    legend_above(figure, [angle], columns=4)
+    return figure
+
+
+def compensated_foot(bench: Bench, gait: str, limb: str, stiffness: float, robot: str = "") -> Figure:
+    """By how much compensation moves the commanded foot, seen from the waist."""
+    account = bench.account(gait, None, robot)
+    table, q = account.robot, account.trajectory.q
+    told = compensated_of(bench, gait, stiffness, "swing", robot).q
+    tip = table.limb(limb).tip
+    places = [
+        as_array(frame_pose(table, link_displacements(table, unstack(each)), tip), (len(q),))[:, :3, 3]
+        for each in (q, told)
+    ]
+    figure, axes = new_figure(3.0)
+    shade_swings(axes, account)
+    for k, colour in enumerate((SIDES[0], SIDES[1], PLAIN)):
+        moved = 1e3 * (places[1] - places[0])[:, k]
+        axes.plot(account.trajectory.time, moved, color=colour, label="xyz"[k], linestyle=LINES[k])
+    axes.set_ylabel(f"{shown(tip)} moved by [mm]")
+    time_axis(axes, account)
+    legend_above(figure, [axes])
+    return figure
+
+
 _ALL: tuple[Drawing, ...] = (
     feet_along_x,
     feet_along_z,
@@ -68,9 +174,16 @@ _ALL: tuple[Drawing, ...] = (
     waist_along_y,
     joint_angles,
     walking,
+    planned,
     zmp_along_x,
     zmp_along_y,
     seen_from_above,
+    reach_maps,
+    deflection_maps,
+    deflection_parts,
+    preview,
+    compensated_joints,
+    compensated_foot,
 )
 
 DRAWINGS: Mapping[str, Drawing] = {drawing.__name__: drawing for drawing in _ALL}

@@ -21,7 +21,7 @@ from screwkin.files import atomic_write, atomic_write_bytes
 from screwkin.report.drawings import DRAWINGS
 from screwkin.report.style import DPI, styled
 
-_COLOURS = 96
+_COLOURS = 256
 _HEAD = ("item", "paper", "ours", "", "note")
 
 
