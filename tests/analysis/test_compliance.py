@@ -102,7 +102,13 @@ def test_a_walk_is_not_compensated_twice(robot: sk.Robot, gait: sk.Gait) -> None
 def test_compensation_halves_the_largest_zmp_error_of_the_whole_walk(
     robot: sk.Robot, gait: sk.Gait, soft: bool
 ) -> None:
-    """On rigid soles, and on elastic ones damped so well that the uncompensated walk stands to the end."""
+    """On rigid soles, and on elastic ones damped so well that the uncompensated walk stands to the end.
+
+    By statics, leading all joints beats the foot's correction in both axes on elastic soles only. On rigid
+    ones both leave the same error sideways: the ankle pushes the ZMP towards the CoM that statics makes it
+    hold.
+    The walk's own torques beat both everywhere.
+    """
     soles = {"sole_stiffness": 2e4, "sole_damping": 300.0} if soft else {}
     rows = compliance_study(robot, sk.walk(robot, gait), 100.0, conditions=Conditions(**soles))
     none, swing, joint, dynamic = rows
@@ -110,8 +116,12 @@ def test_compensation_halves_the_largest_zmp_error_of_the_whole_walk(
     for row in (swing, joint, dynamic):
         assert max(row.median_mm) < 0.5 * max(none.median_mm), row
         assert min(row.cut) >= 0.5, row
-    assert sum(joint.median_mm) < sum(swing.median_mm)
-    assert max(dynamic.median_mm) < 0.5 * max(joint.median_mm)
+    x, y = (joint.median_mm[i] / swing.median_mm[i] for i in range(2))
+    assert x < 0.9
+    assert y < (0.8 if soft else 1.1)
+    for i in range(2):
+        assert dynamic.median_mm[i] < 0.5 * swing.median_mm[i]
+        assert dynamic.median_mm[i] < 0.7 * joint.median_mm[i]
 
 
 @pytest.mark.slow

@@ -94,7 +94,7 @@ def test_elastic_soles_sink_by_the_weight_over_their_stiffness(robot: Robot) -> 
     home = sk.home(robot)
     hold = Command(home.q, np.zeros_like(home.q), home.T_world_base)
     for stiffness, sunk in ((None, 0.0), (2e4, robot.mass * 9.81 / 8 / 2e4)):
-        backend = PyBulletBackend(robot, Physics(sole_stiffness=stiffness))
+        backend = PyBulletBackend(robot, Physics(sole_stiffness=stiffness, sole_damping=100.0))
         backend.reset(home)
         for _ in range(600):
             backend.step(hold)
