@@ -83,7 +83,7 @@ def simple_command(packet: Packet, address_width: int) -> Command:
         case Instruction.ACTION:
             return Command("action", answers=answers)
         case Instruction.FACTORY_RESET:
-            return Command("factory reset", answers=answers)
+            return Command("factory reset", data=params, answers=answers)
         case Instruction.REBOOT if address_width == 2:
             return Command("reboot", answers=answers)
         case Instruction.READ | Instruction.WRITE | Instruction.REG_WRITE:

@@ -51,7 +51,7 @@ def parse(buffer: bytes, ended: bool = False) -> tuple[list[Packet], bytes]:
 
     Where a packet proves false, the search goes on one byte behind its beginning, so that a false header or a
     lost byte costs no packet that follows. A false length may hold up what follows until so many bytes are
-    there (at most 259) or the line has fallen silent: then pass ``ended``, and nothing is waited for any more.
+    there (at most 259) or the line has fallen silent; pass ``ended`` then, and nothing is waited for.
     """
     data = bytes(buffer)
     packets: list[Packet] = []

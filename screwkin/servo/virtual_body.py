@@ -1,0 +1,77 @@
+"""The body of a virtual servo: how it moves, yields, warms up, and when it is in trouble.
+
+The motor follows its goal to first order with a limited speed; the output yields to the load on a spring. All
+of it is in closed form, so that it does not matter how often one looks.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+VOLTAGE, OVERHEAT, OVERLOAD = 0x01, 0x04, 0x20
+"""Bits of an alarm; the same in the error byte of protocol 1.0 and the hardware error register of 2.0."""
+
+_STALL_RISE = 60.0  # K above ambient that full torque would lead to
+_WARMING = 60.0  # s
+
+
+@dataclass
+class Body:
+    """Angles from the servo's centre [rad], torques [N m], times [s], temperatures [degrees Celsius].
+
+    ``stiffness`` [N m/rad] is that of the joint; ``load`` is what the world turns the output with, positive
+    towards greater ticks. ``lag`` is the time constant of the motion. A load beyond the torque limit is an
+    overload once it has lasted for ``patience``.
+    """
+
+    stall_torque: float
+    voltage: float
+    angle: float = 0.0
+    stiffness: float = math.inf
+    load: float = 0.0
+    lag: float = 0.025
+    patience: float = 0.5
+    temperature: float = 30.0
+    ambient: float = 30.0
+    rate: float = 0.0
+    time: float = 0.0
+    overloaded: float = 0.0
+
+    @property
+    def output(self) -> float:
+        """The angle of the output: the motor's, and what the spring yields."""
+        return self.angle + self.load / self.stiffness
+
+    @property
+    def effort(self) -> float:
+        """The torque that holds against the load, as a share of the stall torque."""
+        return -self.load / self.stall_torque
+
+    def advance(self, time: float, goal: float | None, speed: float, torque: float) -> None:
+        """Go on to a time, with a goal (None: limp), a speed limit [rad/s] and a torque limit [share]."""
+        dt = time - self.time
+        if dt <= 0:
+            return
+        self.time = time
+        if goal is None:
+            self.rate, heat, strained = 0.0, 0.0, False
+        else:
+            self.angle, self.rate = follow(self.angle, goal, dt, speed, self.lag)
+            heat, strained = self.effort**2, abs(self.effort) > torque
+        warm = self.ambient + _STALL_RISE * heat
+        self.temperature = warm + (self.temperature - warm) * math.exp(-dt / _WARMING)
+        self.overloaded = self.overloaded + dt if strained else 0.0
+
+
+def follow(angle: float, goal: float, dt: float, speed: float, lag: float) -> tuple[float, float]:
+    """Angle and rate after ``dt`` of d(angle)/dt = (goal - angle)/lag, but no faster than ``speed``."""
+    way, sense = abs(goal - angle), math.copysign(1.0, goal - angle)
+    bend = speed * lag  # where the first order becomes slower than the limit
+    if way > bend:
+        even = (way - bend) / speed
+        if dt <= even:
+            return angle + sense * speed * dt, sense * speed
+        way, dt = bend, dt - even
+    left = way * math.exp(-dt / lag)
+    return goal - sense * left, sense * left / lag
