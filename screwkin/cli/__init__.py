@@ -29,6 +29,7 @@ VERBS = {
     "validate": "Simulate a trajectory and give a verdict.",
     "workspace": "Where a foot can go, held level, and which joint limit cuts there.",
     "stiffness": "How far a foot yields on elastic joints, all over its workspace.",
+    "send": "Play a validated trajectory to the servos; a dry run unless --go.",
     "reproduce": "Every table and figure of a paper, its value beside ours.",
 }
 

@@ -113,6 +113,15 @@ class Bus:
         self._port = _Port(line, self.clock, baud, patience)
         self._handler = sdk.PacketHandler(protocol)
 
+    @property
+    def patience(self) -> float:
+        """Time [s] that a reply may take beyond that of its bytes."""
+        return self._port.patience
+
+    @patience.setter
+    def patience(self, seconds: float) -> None:
+        self._port.patience = seconds
+
     def close(self) -> None:
         """Give the line back; what the servos do is not changed by it."""
         self.line.close()

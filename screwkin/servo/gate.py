@@ -137,6 +137,10 @@ class Bounds:
         """Joint positions (..., n) [rad] of positions [ticks]."""
         return np.asarray((np.asarray(ticks, dtype=float) - self.zero) * self.scale)
 
+    def radians_of(self, k: int, tick: int) -> float:
+        """Position [rad] of one joint at a position [ticks]."""
+        return float((tick - self.zero[k]) * self.scale[k])
+
     def within(self, q: Array) -> Array:
         """The nearest joint positions (..., n) [rad] that may be written."""
         return self.radians(np.clip(np.asarray(q) / self.scale + self.zero, self.low, self.high))

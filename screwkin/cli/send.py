@@ -1,0 +1,192 @@
+"""``screwkin send``."""
+
+from __future__ import annotations
+
+import math
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import Annotated, Any
+
+import typer
+
+from screwkin.analysis.readiness import Ready, ready
+from screwkin.cli.folder import output_folder
+from screwkin.cli.options import AsJson, OutputFolder, TrajectoryPath
+from screwkin.cli.output import print_json, progress_bar, remark
+from screwkin.errors import InputError, UnknownNameError
+from screwkin.servo.budget import budget
+from screwkin.servo.bus import Bus, open_line
+from screwkin.servo.gate import Bounds
+from screwkin.servo.player import Frames, Outcome, Player, PlaySettings, State, describe, frames_of
+from screwkin.servo.servo_map import ServoMap
+from screwkin.servo.virtual_bus import SimulatedClock, VirtualBus
+from screwkin.servo.virtual_servo import VirtualServo
+
+_STATES: tuple[State, ...] = ("hold", "limp")
+_INTERRUPTED = 130
+_REFUSED = 4
+_RETURN_DELAY = 500e-6  # s, of a servo as it comes from the maker
+
+
+def send(
+    trajectory: TrajectoryPath,
+    port: Annotated[str, typer.Option(help="Serial port of the servos, as /dev/ttyUSB0.")] = "",
+    virtual: Annotated[bool, typer.Option("--virtual", help="Play to virtual servos.")] = False,
+    go: Annotated[bool, typer.Option("--go", help="Move; without it nothing is opened.")] = False,
+    robot: Annotated[str, typer.Option(help="The robot's table, if it is not a bundled one.")] = "",
+    rate: Annotated[float, typer.Option(help="Frames per second.")] = 50.0,
+    torque: Annotated[float, typer.Option(help="Share of the servos' torque, 0 to 1.")] = 1.0,
+    far: Annotated[float, typer.Option(help="Farthest a joint may be from its first goal, rad.")] = 1.0,
+    on_fault: Annotated[str, typer.Option(help="After a fault: hold or limp.")] = "hold",
+    at_end: Annotated[str, typer.Option(help="After the last frame: hold or limp.")] = "hold",
+    rs485: Annotated[bool, typer.Option("--rs485", help="Let the kernel switch direction.")] = False,
+    output: OutputFolder = None,
+    as_json: AsJson = False,
+) -> int:
+    """Play a validated trajectory to the servos: a dry run that opens nothing, unless --go.
+
+    Writes play.npz, a log of commands and measurements. Exit code 4 where the trajectory is refused, or a
+    fault stopped it; 130 where it was interrupted.
+    """
+    if port and virtual:
+        raise InputError("--port and --virtual are two buses; give one of them")
+    if go and not (port or virtual):
+        raise InputError("--go needs a bus: --port /dev/ttyUSB0, or --virtual")
+    may = ready(trajectory, robot or None)
+    settings = PlaySettings(
+        rate=rate, torque=torque, far=_distance(far), on_fault=_state(on_fault), at_end=_state(at_end)
+    )
+    servos = ServoMap.of(may.robot)
+    bounds = Bounds.of(may.robot, servos, torque)
+    frames = frames_of(bounds, may.trajectory, rate)
+    carried = budget(bounds.profiles, servos.baud)
+    if rate > carried.limit:
+        raise InputError(f"--rate {rate:g} Hz is more than the bus carries: {carried.limit:.0f} Hz")
+    facts: dict[str, Any] = {
+        "robot": may.robot.name,
+        "moved": go,
+        "rate": rate,
+        "bus_limit_hz": carried.limit,
+        "full_read_hz": carried.full_rate,
+        "reads_per_frame": carried.reads(rate),
+    }
+    if not go:
+        _tell_dry(trajectory, frames, bounds, facts, as_json)
+        return 0
+    with output_folder(output, "send", may.robot.name) as folder:
+        outcome = _played(may, settings, servos, port, rs485, folder / "play.npz")
+    return _tell(outcome, facts | {"log": str(folder / "play.npz")}, bounds, as_json)
+
+
+def _played(
+    may: Ready, settings: PlaySettings, servos: ServoMap, port: str, rs485: bool, log: Path
+) -> Outcome:
+    """Play on the real or the virtual bus, and save the log whatever happens."""
+    if port:
+        bus = Bus(open_line(port, servos.baud, rs485), servos.protocol, servos.baud)
+    else:
+        bus = _virtual_bus(may, servos)
+    meta = {
+        "robot": may.robot.name,
+        "trajectory_sha256": may.trajectory.sha256,
+        "port": port or "virtual",
+        "rate": settings.rate,
+    }
+    with _stop_on_signal() as stopped, progress_bar("playing") as done:
+        player = Player(bus, may.robot, settings, stopped, done)
+        try:
+            outcome = player.play(may.trajectory)
+            meta |= outcome.to_dict()
+            return outcome
+        finally:
+            bus.close()
+            if player.log.frames:
+                player.log.save(log, meta)
+
+
+def _virtual_bus(may: Ready, servos: ServoMap) -> Bus:
+    """Virtual servos of the robot in its posture ``home``, or at zero, on a simulated clock."""
+    home = [posture.q for posture in may.robot.postures if posture.name == "home"]
+    pose = home[0] if home else (0.0,) * len(servos.joints)
+    stiffness = may.robot.servos.get("stiffness", math.inf)
+    clock = SimulatedClock()
+    line = VirtualBus(
+        [
+            VirtualServo(
+                servo.profile,
+                servo.id,
+                servo.direction * angle + servo.zero,
+                float(stiffness) if isinstance(stiffness, int | float) else math.inf,
+                servos.baud,
+                _RETURN_DELAY,
+            )
+            for servo, angle in zip(servos.joints, pose, strict=True)
+        ],
+        clock,
+        servos.baud,
+    )
+    return Bus(line, servos.protocol, servos.baud, clock)
+
+
+@contextmanager
+def _stop_on_signal() -> Iterator[Any]:
+    """Gives a function that tells whether Ctrl-C or a wish to end has come, instead of an exception."""
+    asked: list[int] = []
+
+    def ask(number: int, frame: FrameType | None) -> None:
+        asked.append(number)
+
+    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield lambda: bool(asked)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _tell_dry(path: Path, frames: Frames, bounds: Bounds, facts: dict[str, Any], as_json: bool) -> None:
+    if as_json:
+        print_json(
+            {"frames": len(frames.q), "late_frames": 0, "max_tracking_error": None, "faults": [], **facts}
+        )
+        return
+    print(
+        f"{path}: {len(frames.q)} frames of {len(bounds.ids)} servos at {frames.rate:g} Hz, within limits\n"
+        f"The bus carries at most {facts['bus_limit_hz']:.0f} frames per second, "
+        f"{facts['full_read_hz']:.0f} with every servo read in each; "
+        f"at {frames.rate:g} Hz it reads {facts['reads_per_frame']} servos per frame.\n"
+        "A dry run: nothing was opened. To move: --go with --port or --virtual."
+    )
+
+
+def _tell(outcome: Outcome, facts: dict[str, Any], bounds: Bounds, as_json: bool) -> int:
+    told = describe(outcome, bounds.ids)
+    if as_json:
+        print_json({**outcome.to_dict(), **facts, "message": told})
+    else:
+        print(
+            f"{outcome.frames} frames sent, {outcome.late_frames} late; largest tracking error "
+            f"{outcome.max_tracking_error:.3f} rad; log in {facts['log']}"
+        )
+    if not outcome.faults:
+        if not as_json:
+            remark(told)
+        return 0
+    remark(f"error: {told}")
+    return _INTERRUPTED if outcome.faults[0].kind == "interrupted" else _REFUSED
+
+
+def _state(text: str) -> State:
+    for state in _STATES:
+        if text == state:
+            return state
+    raise UnknownNameError("state of the servos", text, _STATES)
+
+
+def _distance(far: float) -> float:
+    if not far > 0.0:
+        raise InputError(f"--far {far!r} is no distance; give rad above 0, such as 1")
+    return far

@@ -1,0 +1,372 @@
+"""Plays a trajectory on servos, watches them, and leaves them in the state it announces.
+
+The order: read all servos and refuse what looks wrong; goals to where they are, torque on; a soft start to
+the first sample; the trajectory, frame by frame on an absolute schedule; at rest for a moment; hold or go
+limp. Whatever goes wrong, the servos are brought into the state for faults before anything else happens.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from screwkin.errors import InputError, SafetyError
+from screwkin.model.robot import Robot
+from screwkin.servo.budget import block_of, budget
+from screwkin.servo.bus import Bus, Grouped
+from screwkin.servo.gate import Bounds, Gate
+from screwkin.servo.leave import Final, leave
+from screwkin.servo.line import BusError, LineLostError, Reply
+from screwkin.servo.log import Log
+from screwkin.servo.profiles import Profile, physical
+from screwkin.servo.servo_map import ServoMap
+from screwkin.servo.watch import FaultFound, ServoFault, Thresholds, Watch
+from screwkin.trajectory import Trajectory
+
+Array = NDArray[np.float64]
+State = Literal["hold", "limp"]
+_PEAK = 1.875  # greatest rate of a minimum-jerk motion, as a multiple of its mean
+
+
+@dataclass(frozen=True)
+class PlaySettings:
+    """How to play.
+
+    rate [Hz]; torque: share of what the limits allow; start_speed [rad/s] of the soft start; far [rad]: a
+    greater distance from the measured pose to the first sample is refused; settle [s] at rest after the last
+    sample; stop [s]: time to come to rest when told to; tolerance [s]: a frame sent later counts as late;
+    on_fault, at_end: what the servos are left in.
+    """
+
+    rate: float = 50.0
+    torque: float = 1.0
+    start_speed: float = 0.5
+    far: float = 1.0
+    settle: float = 0.5
+    stop: float = 0.4
+    tolerance: float = 0.002
+    on_fault: State = "hold"
+    at_end: State = "hold"
+    thresholds: Thresholds = field(default_factory=Thresholds)
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """The goals of a trajectory at a rate: time (F,) [s] from its first sample, q (F, n) [rad]."""
+
+    rate: float
+    time: Array
+    q: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """What a play came to; ``final`` tells the state in which the servos were left."""
+
+    frames: int
+    late_frames: int
+    max_tracking_error: float
+    faults: tuple[ServoFault, ...]
+    final: Final
+    log: Log
+
+    def to_dict(self) -> dict[str, Any]:
+        """As JSON data, without the log's arrays."""
+        return {
+            "frames": self.frames,
+            "late_frames": self.late_frames,
+            "max_tracking_error": self.max_tracking_error,
+            "faults": [fault.to_dict() for fault in self.faults],
+            "state": self.final.state,
+            "unconfirmed": list(self.final.unconfirmed),
+        }
+
+
+def frames_of(bounds: Bounds, trajectory: Trajectory, rate: float = 50.0) -> Frames:
+    """The frames of a trajectory, each checked as the gate will check it.
+
+    Raises:
+        InputError: no such rate. SafetyError: a frame, or the way from one to the next, is beyond the limits.
+    """
+    if not (math.isfinite(rate) and 1.0 <= rate <= 1000.0):
+        raise InputError(f"rate {rate!r} Hz is none to play at; give one from 1 to 1000, such as 50")
+    count = math.ceil(trajectory.duration * rate - 1e-9) + 1
+    time = np.minimum(np.arange(count) / rate, trajectory.duration)
+    q = trajectory.sampled(trajectory.time[0] + time)[0]
+    bounds.ticks(q)
+    steps = np.abs(np.diff(q, axis=0)) * rate
+    if (steps > bounds.rate).any():
+        i, k = np.unravel_index(int((steps / bounds.rate).argmax()), steps.shape)
+        raise SafetyError(
+            f"{bounds.names[k]} (servo {bounds.ids[k]}) would have to move at {steps[i, k]:.2f} rad/s at "
+            f"{time[i]:.2f} s, its servo at most {bounds.rate[k]:.2f}"
+        )
+    return Frames(rate, time, q)
+
+
+class Player:
+    """Plays on a bus that is open.
+
+    Args:
+        bus: with the robot's servos.
+        robot: whose limits hold.
+        settings: how to play.
+        stop: asked in every frame whether to come to rest early.
+        progress: told the share of the trajectory that was played.
+    """
+
+    def __init__(
+        self,
+        bus: Bus,
+        robot: Robot,
+        settings: PlaySettings | None = None,
+        stop: Callable[[], bool] = lambda: False,
+        progress: Callable[[float], None] = lambda share: None,
+    ) -> None:
+        self.bus, self.robot, self.settings = bus, robot, settings or PlaySettings()
+        self.servos = ServoMap.of(robot)
+        self.bounds = Bounds.of(robot, self.servos, self.settings.torque)
+        self.gate = Gate(bus, self.bounds)
+        self.watch = Watch(self.bounds, self.settings.thresholds)
+        self.log = Log(self.bounds.names, self.bounds.ids)
+        self._stop, self._progress = stop, progress
+        self._frames = self._late = 0
+        self._began = bus.clock.now()
+        self._due = 0.0
+        self._queue = deque(range(len(self.bounds.ids)))
+        self._adapter = 1e-3
+
+    def play(self, trajectory: Trajectory) -> Outcome:
+        """Play the trajectory, and leave the servos as the settings tell.
+
+        Raises:
+            SafetyError: beyond limits, or the servos are not in a state to begin; nothing has moved.
+            InputError: more frames per second than the bus carries. Any other exception is passed on after
+                the servos were brought into the state for faults.
+        """
+        frames = frames_of(self.bounds, trajectory, self.settings.rate)
+        carried = budget(self.bounds.profiles, self.bus.baud)
+        if frames.rate > carried.limit:
+            raise InputError(
+                f"{frames.rate:g} frames per second are more than the bus carries: {carried.limit:.0f}"
+            )
+        pose = self.ready_pose(frames.q[0])
+        fault: ServoFault | None = None
+        final = Final("unknown", self.bounds.names)
+        retries, patience = self.bus.retries, self.bus.patience
+        state = self.settings.on_fault
+        try:
+            self._tune(patience)
+            self._run(frames, pose)
+            state = self.settings.at_end
+        except FaultFound as found:
+            fault = found.fault
+        except LineLostError as error:
+            fault = ServoFault("line", "", -1, self._time(), str(error))
+        except SafetyError as error:
+            fault = ServoFault("gate", "", -1, self._time(), str(error))
+        except KeyboardInterrupt:
+            fault = ServoFault("interrupted", "", -1, self._time(), "stopped by the user")
+        finally:
+            self.bus.retries, self.bus.patience = 1, min(patience, 0.005)
+            final = leave(self.gate, self.bus, state, self.settings.at_end == state and fault is None)
+            self.bus.retries, self.bus.patience = retries, patience
+        faults = (fault,) if fault else ()
+        return Outcome(self._frames, self._late, self.watch.max_tracking_error, faults, final, self.log)
+
+    def ready_pose(self, first: Array) -> Array:
+        """The measured pose (n,) [rad], if the servos may begin.
+
+        Raises:
+            SafetyError: a servo is silent or complains, or the first sample is far; all reasons at once.
+        """
+        reasons, pose = [], np.full(len(self.bounds.ids), np.nan)
+        for k, (name, id) in enumerate(zip(self.bounds.names, self.bounds.ids, strict=True)):
+            profile = self.bounds.profiles[k]
+            try:
+                number = self.bus.read(id, *_place(profile, "model_number")).value
+                if profile.verified and number != profile.number:
+                    reasons.append(
+                        f"{name} (servo {id}) is of model {number}, a {profile.model} is {profile.number}"
+                    )
+                    continue
+                reply = self._ask(k)
+                values = self._values(k, reply)
+                pose[k] = values["position"]
+                self.watch.seen(k, values, reply.errors, 0.0)
+            except LineLostError:
+                raise
+            except BusError as error:
+                reasons.append(f"{name}: {error}")
+            except FaultFound as found:
+                reasons.append(f"{name} (servo {id}): {found.fault.message}")
+        away = np.abs(pose - first)
+        reasons += [
+            f"{self.bounds.names[k]} (servo {self.bounds.ids[k]}) stands {away[k]:.2f} rad from its first "
+            f"goal, at most {self.settings.far:.2f}: move it nearer, or allow more with --far"
+            for k in np.flatnonzero(away > self.settings.far)
+        ]
+        if reasons:
+            raise SafetyError("the servos are not ready: " + "; ".join(reasons))
+        return pose
+
+    def _tune(self, patience: float) -> None:
+        """In a play nobody waits long: a lost reply is asked for again in the next frame."""
+        self.bus.retries = 0
+        self.bus.patience = min(patience, max(0.003, 3.0 * self.bus.statistics.mean))
+
+    def _run(self, frames: Frames, pose: Array) -> None:
+        start = self.bounds.within(pose)
+        self.gate.torque_limit()
+        self.gate.stay(dict(enumerate(self.bounds.ticks(start).tolist())))
+        self.gate.torque(True)
+        if self._torque_is_read():
+            self.watch.torque_limits = self.bounds.torque
+        self._began = self.bus.clock.now()
+        self._due = self._began
+        self._stream(self._approach(start, frames.q[0]), None)
+        self._stream(frames.q, frames.time)
+        rest = np.repeat(frames.q[-1:], math.ceil(self.settings.settle * frames.rate), axis=0)
+        self._stream(rest, None)
+
+    def _torque_is_read(self) -> bool:
+        return all("torque_limit" in block_of(profile)[2] for profile in self.bounds.profiles)
+
+    def _approach(self, start: Array, goal: Array) -> Array:
+        """Goals of the soft start: minimum jerk, no joint above the start speed."""
+        lasts = max(1.0, _PEAK * float(np.abs(goal - start).max()) / self.settings.start_speed)
+        u = np.arange(1, math.ceil(lasts * self.settings.rate) + 1)[:, None]
+        u = np.minimum(u / (lasts * self.settings.rate), 1.0)
+        return np.asarray(start + (goal - start) * u**3 * (10 - 15 * u + 6 * u**2))
+
+    def _stream(self, q: Array, times: Array | None) -> None:
+        """Send goals frame by frame at absolute times; in between, read servos as long as there is time."""
+        period, clock = 1.0 / self.settings.rate, self.bus.clock
+        for i, goal in enumerate(q):
+            if (wait := self._due - clock.now()) > 0:
+                clock.sleep(wait)
+            if self._stop():
+                self._come_to_rest(q, i, times)
+            late = clock.now() - self._due
+            self._frames += 1
+            self._late += late > self.settings.tolerance
+            self.gate.goals(goal, period)
+            self.log.frame(
+                self._due - self._began,
+                late + self._due - self._began,
+                times[i] if times is not None else math.nan,
+                goal,
+            )
+            self.watch.late(late, self._time())
+            self._due += period
+            self._read(goal)
+            if times is not None:
+                self._progress((i + 1) / len(q))
+
+    def _come_to_rest(self, q: Array, i: int, times: Array | None) -> None:
+        """Run on ever more slowly for a moment, then stop."""
+        self._stop = lambda: False
+        count = max(1, round(self.settings.stop * self.settings.rate))
+        steps = np.cumsum(np.linspace(1.0, 0.0, count, endpoint=False))
+        at = np.minimum(i - 1 + steps, len(q) - 1)
+        low = np.floor(np.maximum(at, 0.0)).astype(int)
+        share = (np.maximum(at, 0.0) - low)[:, None]
+        self._stream(q[low] * (1 - share) + q[np.minimum(low + 1, len(q) - 1)] * share, None)
+        raise FaultFound(ServoFault("interrupted", "", -1, self._time(), "stopped by the user"))
+
+    def _read(self, goal: Array) -> None:
+        """Read servos in turn until the next frame is near; who did not answer is first in the next frame."""
+        again: list[int] = []
+        estimate = self._estimate()
+        if self._grouped() != "none":
+            self._read_group(goal)
+            return
+        for _ in range(len(self._queue)):
+            if self.bus.clock.now() + estimate > self._due:
+                break
+            k = self._queue.popleft()
+            try:
+                self._take(k, self._ask(k), goal)
+                self._queue.append(k)
+            except LineLostError:
+                raise
+            except BusError:
+                again.append(k)
+                self.watch.lost(k, self._time())
+        self._queue.extendleft(reversed(again))
+
+    def _read_group(self, goal: Array) -> None:
+        start, length, _ = block_of(self.bounds.profiles[0])
+        count = max(1, budget(self.bounds.profiles, self.bus.baud).reads(self.settings.rate))
+        chosen = [self._queue[i] for i in range(min(count, len(self._queue)))]
+        self._queue.rotate(-len(chosen))
+        ids = [self.bounds.ids[k] for k in chosen]
+        replies = self.bus.read_many(ids, start, length, self._grouped())
+        for k, id in zip(chosen, ids, strict=True):
+            if id in replies:
+                self._take(k, replies[id], goal)
+            else:
+                self.watch.lost(k, self._time())
+
+    def _grouped(self) -> Grouped:
+        profiles = self.bounds.profiles
+        if len({profile.model for profile in profiles}) > 1:
+            return "none"
+        if profiles[0].has_sync_read:
+            return "sync"
+        return "bulk" if profiles[0].has_bulk_read else "none"
+
+    def _estimate(self) -> float:
+        """Time that one more reading is likely to take [s]."""
+        mean = self.bus.statistics.mean
+        return budget(self.bounds.profiles, self.bus.baud).read if math.isnan(mean) else mean
+
+    def _take(self, k: int, reply: Reply, goal: Array) -> None:
+        values, time = self._values(k, reply), self._time()
+        self.log.measured(k, values)
+        self.watch.seen(k, values, reply.errors, time)
+        self.watch.tracked(k, values, float(goal[k]), time)
+
+    def _ask(self, k: int) -> Reply:
+        start, length, _ = block_of(self.bounds.profiles[k])
+        return self.bus.read(self.bounds.ids[k], start, length)
+
+    def _values(self, k: int, reply: Reply) -> dict[str, float]:
+        """What a servo's block tells, in SI; the torque registers as they are."""
+        profile = self.bounds.profiles[k]
+        start, _, names = block_of(profile)
+        raw = {name: _register(profile, name, reply.data, start) for name in names}
+        values = {
+            name.removeprefix("present_"): physical(profile, name, number)
+            for name, number in raw.items()
+            if name.startswith("present_")
+        }
+        values["position"] = self.bounds.radians_of(k, raw["present_position"])
+        values["speed"] *= self.servos.joints[k].direction
+        values |= {name: float(raw[name]) for name in ("torque_enable", "torque_limit") if name in raw}
+        return values
+
+    def _time(self) -> float:
+        return self.bus.clock.now() - self._began
+
+
+def _place(profile: Profile, name: str) -> tuple[int, int]:
+    register = profile.register(name)
+    return register.address, register.width
+
+
+def _register(profile: Profile, name: str, data: bytes, start: int) -> int:
+    register = profile.register(name)
+    return int.from_bytes(data[register.address - start : register.end - start], "little")
+
+
+def describe(outcome: Outcome, ids: Sequence[int]) -> str:
+    """One sentence about how a play ended."""
+    how = "; ".join(map(str, outcome.faults)) or "played to its end"
+    return f"{how}. {outcome.final.sentence(len(ids))}"

@@ -1,0 +1,145 @@
+"""``screwkin send``: a dry run that opens nothing, refusals, and plays to the virtual servos."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from screwkin.cli import run
+from screwkin.files import read_npz
+from screwkin.trajectory import load_trajectory
+
+
+@pytest.fixture(scope="session")
+def smooth(tmp_path_factory) -> Path:
+    """Folder with a walk of two steps within the servos' speed; read it only."""
+    folder = tmp_path_factory.mktemp("smooth")
+    words = ["walk", "bioloid", "--gait", "smooth", "--steps", "2", "--no-plots", "-o", str(folder), "--json"]
+    assert run(words) == 0
+    return folder
+
+
+@pytest.fixture
+def passed(smooth, tmp_path) -> Path:
+    """A copy of that walk with a verdict beside it that it passed."""
+    path = tmp_path / "trajectory.npz"
+    shutil.copy(smooth / "trajectory.npz", path)
+    return judged(path)
+
+
+def judged(path: Path, **change: object) -> Path:
+    verdict = {"passed": True, "reasons": [], "trajectory_sha256": load_trajectory(path).sha256} | change
+    (path.parent / "validation.json").write_text(json.dumps(verdict))
+    return path
+
+
+def test_a_dry_run_counts_the_frames_and_opens_nothing(cli, passed, tmp_path):
+    before = sorted(tmp_path.iterdir())
+    data = cli("send", passed, "--port", "/dev/none", "--json").data
+    assert data["frames"] == load_trajectory(passed).samples
+    assert (data["late_frames"], data["faults"], data["moved"]) == (0, [], False)
+    assert data["max_tracking_error"] is None
+    assert sorted(tmp_path.iterdir()) == before
+
+
+def test_a_dry_run_tells_what_the_bus_carries(cli, passed):
+    """Goals of 18 servos: 98 bytes, 0.98 ms at 1 Mbaud; a reading: 34 bytes, 0.5 ms, 1 ms of the adapter."""
+    data = cli("send", passed, "--json").data
+    assert data["bus_limit_hz"] == pytest.approx(1 / (0.98e-3 + 1.84e-3))
+    assert data["full_read_hz"] == pytest.approx(1 / (0.98e-3 + 18 * 1.84e-3))
+    assert data["reads_per_frame"] == 10
+    assert "at most 355 frames per second" in cli("send", passed).out
+
+
+def test_a_rate_beyond_what_the_bus_carries_is_bad_input(cli, refused, passed):
+    assert "355" in refused(cli("send", passed, "--rate", "500"), 2)
+
+
+def test_a_walk_that_was_not_validated_is_refused(cli, refused, passed):
+    (passed.parent / "validation.json").unlink()
+    assert "never validated" in refused(cli("send", passed, "--virtual", "--go"), 4)
+
+
+def test_a_walk_that_failed_validation_is_refused_with_its_reason(cli, refused, passed):
+    judged(passed, passed=False, reasons=["fell at 1.20 s"])
+    assert "fell at 1.20 s" in refused(cli("send", passed), 4)
+
+
+def test_the_validation_of_another_file_is_refused(cli, refused, passed, walked):
+    judged(passed, trajectory_sha256=load_trajectory(walked / "trajectory.npz").sha256)
+    assert "another trajectory" in refused(cli("send", passed), 4)
+
+
+def test_an_edited_trajectory_is_refused(cli, refused, passed):
+    data = bytearray(passed.read_bytes())
+    data[-200] ^= 1
+    passed.write_bytes(data)
+    assert "changed after it was validated" in refused(cli("send", passed), 4)
+
+
+def test_a_changed_robot_table_is_refused(cli, refused, passed, tmp_path):
+    table = tmp_path / "mine.toml"
+    table.write_text(load_trajectory(passed).meta["robot"]["table"] + "\n# measured again\n")
+    assert "changed" in refused(cli("send", passed, "--robot", table), 4)
+
+
+def test_speeds_above_the_servos_are_refused(cli, refused, tmp_path):
+    """Steps in half a second ask for more than an AX-12 gives."""
+    words = ["walk", "bioloid", "--set", "Tc=0.5", "--steps", "2", "--no-plots", "-o", tmp_path, "--json"]
+    assert cli(*words).code == 0
+    told = refused(cli("send", judged(tmp_path / "trajectory.npz")), 4)
+    assert "rad/s, its servo at most 6.00" in told
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--go"], "--go needs a bus"),
+        (["--port", "/dev/none", "--virtual"], "two buses"),
+        (["--rate", "nan"], "rate"),
+        (["--far", "-1"], "--far"),
+        (["--on-fault", "jump"], "hold, limp"),
+        (["--port", "/dev/none", "--go"], "cannot open port /dev/none"),
+    ],
+)
+def test_wrong_options_are_bad_input(cli, refused, passed, words, told):
+    assert told in refused(cli("send", passed, *words), 2)
+
+
+def test_a_torque_beyond_the_servos_is_refused(cli, refused, passed):
+    assert "torque limit 1.5" in refused(cli("send", passed, "--torque", "1.5"), 4)
+
+
+@pytest.mark.parametrize("state", ["hold", "limp"])
+def test_a_walk_is_played_to_the_virtual_servos(cli, passed, tmp_path, state):
+    """Every frame is sent; an AX-12 lags behind by some 25 ms of 5 rad/s, and by a frame."""
+    log = tmp_path / "out"
+    data = cli("send", passed, "--virtual", "--go", "--at-end", state, "-o", log, "--json").data
+    assert (data["faults"], data["late_frames"], data["unconfirmed"]) == ([], 0, [])
+    assert (data["state"], data["moved"]) == (state, True)
+    assert 0.01 < data["max_tracking_error"] < 0.3
+    arrays = read_npz((log / "play.npz").read_bytes())
+    walk = load_trajectory(passed)
+    played = np.isfinite(arrays["trajectory_time"])
+    assert played.sum() == walk.samples
+    assert len(arrays["time"]) == data["frames"]
+    np.testing.assert_allclose(arrays["command"][played], walk.q, atol=1e-9)
+    assert (np.abs(np.diff(arrays["time"]) - 0.02) < 1e-9).all(), "no drift"
+    assert np.isfinite(arrays["position"]).any(axis=0).all()
+
+
+def test_a_play_that_ends_well_says_so(cli, passed, tmp_path):
+    called = cli("send", passed, "--virtual", "--go", "-o", tmp_path / "out")
+    assert called.code == 0
+    assert "frames sent, 0 late" in called.out
+    assert "All 18 servos hold their positions." in called.err
+
+
+def test_servos_far_from_the_first_goal_are_refused_and_nothing_is_written(cli, refused, passed, tmp_path):
+    told = refused(cli("send", passed, "--virtual", "--go", "--far", "0.001", "-o", tmp_path / "out"), 4)
+    assert "from its first goal" in told
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,296 @@
+"""Plays on the virtual bus in simulated time: schedule, limits, faults, and the state that is left."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from screwkin.errors import InputError, SafetyError
+from screwkin.gait.files import load_gait
+from screwkin.gait.walk import walk
+from screwkin.model.robot import Robot
+from screwkin.model.table import load_robot
+from screwkin.servo.budget import budget
+from screwkin.servo.bus import Bus
+from screwkin.servo.gate import Bounds
+from screwkin.servo.player import Player, PlaySettings, describe, frames_of
+from screwkin.servo.profiles import load_profile
+from screwkin.servo.servo_map import ServoMap
+from screwkin.servo.virtual_bus import SimulatedClock, VirtualBus
+from screwkin.servo.virtual_servo import VirtualServo
+from screwkin.servo.virtual_trouble import Trouble
+from screwkin.trajectory import Trajectory
+
+ROBOT = load_robot("bioloid")
+WITHIN = 2.0  # s of the clock: in the walk; it begins after 0.05 s of asking and 1 s of soft start
+
+
+@cache
+def steps() -> Trajectory:
+    return walk(ROBOT, load_gait("smooth"), 1)
+
+
+class Rig:
+    """A player on virtual servos that stand in the home posture; every command to a servo is kept."""
+
+    def __init__(self, *troubles: Trouble, robot: Robot = ROBOT, seed: int = 0, **settings: object) -> None:
+        self.clock, self.told = SimulatedClock(), []
+        servos = ServoMap.of(robot)
+        self.line = VirtualBus(
+            [
+                VirtualServo(s.profile, s.id, s.direction * angle + s.zero, return_delay=500e-6)
+                for s, angle in zip(servos.joints, robot.posture("home").q, strict=True)
+            ],
+            self.clock,
+            troubles=troubles,
+            seed=seed,
+            witness=lambda time, id, command: self.told.append((time, id, command)),
+        )
+        self.player = Player(
+            Bus(self.line, servos.protocol, clock=self.clock), robot, PlaySettings(**settings)
+        )
+
+    def play(self, trajectory: Trajectory | None = None):
+        return self.player.play(trajectory or steps())
+
+    def all(self, register: str) -> set[int]:
+        """What a register holds on all servos."""
+        return {servo.get(register) for servo in self.line.servos}
+
+    def written(self, address: int) -> list[int]:
+        """Every number of two bytes that any servo was told to write there."""
+        found = []
+        for _, _, command in self.told:
+            if command.kind == "write" and 0 <= address - command.address <= len(command.data) - 2:
+                at = address - command.address
+                found.append(int.from_bytes(command.data[at : at + 2], "little"))
+        return found
+
+
+def test_a_walk_is_played_frame_by_frame_without_drift():
+    rig = Rig()
+    outcome = rig.play()
+    assert outcome.faults == ()
+    assert outcome.late_frames == 0
+    arrays = rig.player.log.arrays({})
+    np.testing.assert_allclose(np.diff(arrays["sent"]), 0.02, atol=2e-4)
+    assert abs(arrays["sent"][-1] - 0.02 * (outcome.frames - 1)) < 2e-4, "the last frame is as timely as any"
+    assert np.isfinite(arrays["trajectory_time"]).sum() == steps().samples
+    assert rig.all("torque_enable") == {1}
+
+
+def test_tracking_is_what_the_servos_motion_allows():
+    """First order with 25 ms: behind a ramp of w rad/s by 0.025 w, and by a frame of the goals' steps."""
+    outcome = Rig().play()
+    fastest = np.abs(steps().qd).max()
+    assert 0.2 * 0.025 * fastest < outcome.max_tracking_error < (0.025 + 0.02) * fastest + 0.01
+
+
+def test_the_soft_start_comes_from_the_measured_pose_at_the_start_speed():
+    rig = Rig(start_speed=0.25)
+    for servo in rig.line.servos:
+        servo.body.angle += 0.3
+    before = [servo.body.angle for servo in rig.line.servos]
+    rig.play()
+    arrays = rig.player.log.arrays({})
+    start = np.isnan(arrays["trajectory_time"]) & (np.arange(len(arrays["time"])) < 200)
+    rates = np.abs(np.diff(arrays["command"][start], axis=0)) / 0.02
+    assert rates.max() <= 0.25 * (1 + 1e-6)
+    servos = ServoMap.of(ROBOT).joints
+    first = [s.direction * a - s.zero for s, a in zip(servos, before, strict=True)]
+    np.testing.assert_allclose(arrays["command"][0], first, atol=0.01)
+
+
+def test_servos_that_are_far_are_refused_before_anything_is_written():
+    rig = Rig(far=0.5)
+    rig.line.servo(13).body.angle += 0.8
+    rig.line.servo(14).body.angle -= 0.8
+    with pytest.raises(SafetyError, match=r"right_knee \(servo 13\).*left_knee \(servo 14\)"):
+        rig.play()
+    assert not [command for _, _, command in rig.told if command.kind != "read"]
+
+
+def test_all_that_is_wrong_with_a_found_bus_is_told_at_once():
+    rig = Rig(Trouble("deaf", id=3), Trouble("brown-out", id=9, volts=7.0))
+    rig.line.servo(5).put("model_number", 29)
+    with pytest.raises(SafetyError) as caught:
+        rig.play()
+    for told in ("servo 3 does not answer", "(servo 5) is of model 29", "(servo 9)"):
+        assert told in str(caught.value)
+    assert not [command for _, _, command in rig.told if command.kind != "read"]
+
+
+@pytest.mark.parametrize("state", ["hold", "limp"])
+@pytest.mark.parametrize(
+    ("trouble", "kinds"),
+    [
+        (Trouble("deaf", WITHIN, id=11), {"lost"}),
+        (Trouble("dropped", WITHIN, WITHIN + 1.0), {"lost"}),
+        (Trouble("corrupted", WITHIN, id=11), {"lost"}),
+        (Trouble("truncated", WITHIN, id=11), {"lost"}),
+        (Trouble("late", WITHIN, id=11), {"lost"}),
+        (Trouble("overheat", WITHIN, id=11), {"servo", "temperature"}),
+        (Trouble("brown-out", WITHIN, id=11, volts=7.0), {"servo", "voltage"}),
+        (Trouble("overload", WITHIN, id=11), {"servo", "load", "tracking", "torque"}),
+        (Trouble("reset", WITHIN, id=11), {"lost", "torque"}),
+    ],
+    ids=lambda value: value.kind if isinstance(value, Trouble) else "",
+)
+def test_a_fault_stops_the_play_and_leaves_the_announced_state(trouble, kinds, state):
+    rig = Rig(trouble, on_fault=state, torque=0.9)
+    outcome = rig.play()
+    [fault] = outcome.faults
+    assert fault.kind in kinds, str(fault)
+    if trouble.id is not None:
+        assert (fault.joint, fault.id) == ("right_hip_pitch", 11)
+    assert 0.5 < fault.time < WITHIN + 1.5
+    arrays = rig.player.log.arrays({})
+    assert len(arrays["time"]) == outcome.frames
+    assert arrays["time"][-1] >= fault.time - 0.06, "the log goes up to the fault"
+    rig.clock.sleep(1.0)
+    rig.line.advance()
+    given_up = {rig.player.servos.joint(name).id for name in outcome.final.unconfirmed}
+    if trouble.kind == "overload":
+        given_up.add(11)  # who goes on being overloaded shuts itself down some time, whatever it was told
+    confirmed = [servo for servo in rig.line.servos if servo.id not in given_up]
+    if outcome.final.state == "unknown":
+        assert trouble.kind == "dropped"
+        assert state == "hold" or rig.all("torque_enable") == {0}, "limp even where nobody confirms it"
+    else:
+        assert outcome.final.state == state
+        assert len(confirmed) >= 17
+    assert {servo.get("torque_enable") for servo in confirmed} <= {1 if state == "hold" else 0}
+    if state == "hold":
+        assert all(abs(servo.body.rate) < 1e-2 for servo in confirmed), "nothing moves any more"
+
+
+def test_a_pulled_cable_ends_the_play_at_once():
+    rig = Rig(Trouble("pulled", WITHIN))
+    outcome = rig.play()
+    assert rig.clock.now() - WITHIN < 0.2
+    assert (outcome.faults[0].kind, outcome.final.state) == ("line", "unknown")
+    assert "Switch their power off" in describe(outcome, rig.player.bounds.ids)
+    assert rig.player.log.frames > 20
+
+
+def test_silence_of_all_servos_ends_the_play_within_200_ms():
+    rig = Rig(Trouble("deaf", WITHIN))
+    outcome = rig.play()
+    assert rig.clock.now() - WITHIN < 0.2
+    assert (outcome.faults[0].kind, outcome.final.state) == ("lost", "unknown")
+
+
+def test_single_lost_replies_do_not_stop_a_walk():
+    outcome = Rig(Trouble("dropped", 1.5, share=0.02), Trouble("noise", 1.5, share=0.05), seed=3).play()
+    assert outcome.faults == ()
+
+
+@pytest.mark.parametrize("state", ["hold", "limp"])
+def test_a_wish_to_stop_brings_the_robot_to_rest_without_a_jump(state):
+    rig = Rig(on_fault=state)
+    rig.player._stop = lambda: rig.clock.now() > WITHIN
+    outcome = rig.play()
+    assert outcome.faults[0].kind == "interrupted"
+    assert rig.all("torque_enable") == {1 if state == "hold" else 0}
+    rates = np.abs(np.diff(rig.player.log.arrays({})["command"], axis=0)) / 0.02
+    assert rates.max() < np.abs(steps().qd).max() * 1.1
+    assert rates[-1].max() < 0.2 * rates.max() + 0.1
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError])
+@pytest.mark.parametrize("state", ["hold", "limp"])
+def test_an_interrupt_or_a_bug_leaves_the_announced_state_too(error, state):
+    rig = Rig(on_fault=state)
+
+    def fail(share: float) -> None:
+        if share > 0.3:
+            raise error
+
+    rig.player._progress = fail
+    if error is KeyboardInterrupt:
+        assert rig.play().faults[0].kind == "interrupted"
+    else:
+        with pytest.raises(RuntimeError):
+            rig.play()
+    assert rig.all("torque_enable") == {1 if state == "hold" else 0}
+
+
+def test_torque_and_speed_are_limited_on_every_servo():
+    rig = Rig(torque=0.5)
+    rig.play()
+    assert max(rig.written(34)) == 511
+    assert rig.all("torque_limit") == {511}
+    assert 0 < min(rig.written(32)) <= max(rig.written(32)) <= 516
+
+
+def test_seeded_campaign_of_faults_never_writes_beyond_limits():
+    """Random troubles at random times; limits are tightened so that a slip would show."""
+    q = steps().q
+    margin = math.radians(2)
+    joints = tuple(
+        replace(joint, lower=float(q[:, k].min()) - margin, upper=float(q[:, k].max()) + margin)
+        for k, joint in enumerate(ROBOT.joints)
+    )
+    robot = replace(ROBOT, joints=joints)
+    servos = {
+        servo.id: (servo, joint) for servo, joint in zip(ServoMap.of(robot).joints, joints, strict=True)
+    }
+    kinds = ("deaf", "dropped", "corrupted", "truncated", "late", "noise", "reset", "overload", "overheat")
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        state = ("hold", "limp")[seed % 2]
+        at = float(rng.uniform(1.2, 4.0))
+        kind = (*kinds, "brown-out", "pulled")[int(rng.integers(11))]
+        id = None if rng.random() < 0.3 else int(rng.integers(1, 19))
+        rig = Rig(
+            Trouble(kind, at, at + float(rng.uniform(0.05, 2.0)), id), robot=robot, seed=seed, on_fault=state
+        )
+        outcome = rig.play()
+        for _, number, command in rig.told:
+            if command.kind == "write" and command.address == 30:
+                servo, joint = servos[number]
+                angle = servo.angle_from_ticks(int.from_bytes(command.data[:2], "little"))
+                assert joint.lower - 1e-9 <= angle <= joint.upper + 1e-9, (seed, kind)
+        assert rig.player.log.frames == outcome.frames
+        assert outcome.final.state in (state, "hold", "unknown"), (seed, kind)
+        for fault in outcome.faults:
+            assert fault.id in (id, -1) or id is None, (seed, kind, str(fault))
+
+
+@pytest.mark.parametrize("rate", [0.0, -50.0, math.nan, math.inf, 5000.0])
+def test_a_rate_that_is_none_is_bad_input(rate):
+    with pytest.raises(InputError):
+        frames_of(Bounds.of(ROBOT), steps(), rate)
+
+
+def test_a_rate_beyond_the_bus_is_told_with_the_limit():
+    with pytest.raises(InputError, match="more than the bus carries: 355"):
+        Rig(rate=400.0).play()
+
+
+def test_frames_too_fast_for_a_servo_are_refused_with_joint_and_time():
+    with pytest.raises(SafetyError, match=r"\(servo \d+\) would have to move at .* rad/s at .* s"):
+        frames_of(
+            Bounds.of(replace(ROBOT, joints=tuple(replace(j, velocity=1.0) for j in ROBOT.joints))), steps()
+        )
+
+
+def test_a_budget_counts_the_bytes():
+    """One MX-28 of protocol 2.0 at 57600 baud: 23 bytes of goals; 14 asked and 11 + 21 answered."""
+    found = budget((load_profile("MX-28-2"),), 57_600, return_delay=0.0, adapter=0.0)
+    assert found.write == pytest.approx(23 * 10 / 57_600)
+    assert found.read == pytest.approx(46 * 10 / 57_600)
+    assert found.reads(50.0) == 1
+
+
+def test_a_robot_on_protocol_2_plays_with_sync_reads():
+    servos = {**ROBOT.servos, "model": "MX-28-2", "protocol": 2.0}
+    rig = Rig(robot=replace(ROBOT, servos=servos))
+    outcome = rig.play()
+    assert outcome.faults == ()
+    assert np.isfinite(rig.player.log.arrays({})["position"]).any(axis=0).all()
+    assert rig.all("torque_enable") == {1}
