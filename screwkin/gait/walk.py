@@ -42,8 +42,7 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
         UnreachableError, SingularError, LimitError: names limb, sample and time.
         GaitError, InputError: the gait does not fit the robot.
     """
-    if not (isinstance(robot, Robot) and isinstance(gait, Gait)):
-        raise InputError("walk takes a robot from load_robot and a gait from load_gait, not names or paths")
+    _check_kinds(robot, gait)
     steps = gait.steps if steps is None else steps
     mechanism = closed_mechanism(robot)
     if gait.kind == "preview":
@@ -88,6 +87,11 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
             "command": command,
         },
     )
+
+
+def _check_kinds(robot: object, gait: object) -> None:
+    if not (isinstance(robot, Robot) and isinstance(gait, Gait)):
+        raise InputError("walk takes a robot from load_robot and a gait from load_gait, not names or paths")
 
 
 def _tip_poses(robot: Robot, made: Plan, q: Array) -> dict[str, Array]:
