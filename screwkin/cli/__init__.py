@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from io import TextIOWrapper
 from typing import Any, NoReturn
@@ -30,8 +30,16 @@ VERBS = {
     "workspace": "Where a foot can go, held level, and which joint limit cuts there.",
     "stiffness": "How far a foot yields on elastic joints, all over its workspace.",
     "send": "Play a validated trajectory to the servos; a dry run unless --go.",
+    "bus": "Servos on a bus, or virtual ones: screwkin bus --help lists the verbs.",
     "reproduce": "Every table and figure of a paper, its value beside ours.",
 }
+
+APP: Mapping[str, Any] = {
+    "add_completion": False,
+    "rich_markup_mode": None,  # a rich help would swallow brackets, and cost a tenth of a second
+    "pretty_exceptions_enable": False,
+}
+"""How typer is set up, here and by the verbs that are groups of verbs."""
 
 _INTERRUPTED = 130
 
@@ -104,9 +112,10 @@ def _dispatch(words: Sequence[str]) -> int:
         raise UnknownNameError("verb", name, tuple(VERBS))
     import typer
 
-    # No markup: a rich help would swallow brackets, and cost a tenth of a second.
-    app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
-    app.command(name)(getattr(import_module(f"screwkin.cli.{name}"), name))
+    verb = getattr(import_module(f"screwkin.cli.{name}"), name)
+    app = verb if isinstance(verb, typer.Typer) else typer.Typer(**APP)
+    if app is not verb:
+        app.command(name)(verb)
     try:
         code: Any = app(args=list(words[1:]), prog_name=f"screwkin {name}", standalone_mode=False)
     except typer.Abort:

@@ -1,0 +1,18 @@
+"""``screwkin bus``: the verbs that talk to servos, or stand in for them."""
+
+from __future__ import annotations
+
+import typer
+
+from screwkin.cli import APP
+from screwkin.cli.bus_virtual import virtual
+
+bus = typer.Typer(**APP)
+
+
+@bus.callback()
+def group() -> None:
+    """Servos on a bus. Every verb here takes --json: one JSON object on stdout."""
+
+
+bus.command("virtual")(virtual)
