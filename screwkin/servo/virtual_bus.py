@@ -21,7 +21,7 @@ from screwkin.servo.protocols import Codec, codec
 from screwkin.servo.virtual_servo import VirtualServo
 from screwkin.servo.virtual_trouble import Trouble, deafened, suffered
 
-_SILENCE = 0.005  # s, after which what has come of a packet is given up
+_SILENCE = 0.005  # s, after which no more bytes of a packet are waited for
 _BITS_PER_BYTE = 10
 _SAME_RATE = 0.03  # of the rate: what both ends of a line tolerate
 _SERVOS_OWN = ("reset", "overload", "overheat", "brown-out")
@@ -119,15 +119,9 @@ class VirtualBus:
         """
         now = self.clock.now()
         self._plugged(now)
-        if now - max(self._last, self._free) > _SILENCE:
-            self._heard = b""
-        self._last = now
         sent = max(now, self._free) + len(data) * self._byte_time
-        self._free = sent
-        packets, self._heard = self._codec.parse(self._heard + bytes(data))
-        for packet in packets:
-            self.packets += 1
-            self._free = max(self._free, self._obey(packet, sent))
+        self._free = self._last = sent
+        self._hear(bytes(data), sent)
         return len(data)
 
     def read(self, size: int = 1) -> bytes:
@@ -163,6 +157,13 @@ class VirtualBus:
     @property
     def _byte_time(self) -> float:
         return _BITS_PER_BYTE / self.baudrate
+
+    def _hear(self, data: bytes, time: float, ended: bool = False) -> None:
+        """Let the servos obey the packets that bytes make up with those before."""
+        packets, self._heard = self._codec.parse(self._heard + data, ended)
+        for packet in packets:
+            self.packets += 1
+            self._free = max(self._free, self._obey(packet, time))
 
     def _obey(self, packet: Packet, time: float) -> float:
         """Let the servos concerned carry out a packet; returns when the line is free again."""
@@ -225,6 +226,8 @@ class VirtualBus:
             self._arrived += heappop(self._coming)[2]
 
     def _plugged(self, now: float) -> None:
+        if self._heard and now > self._last + _SILENCE:
+            self._hear(b"", self._last + _SILENCE, ended=True)
         self._live_through(now)
         if self.pulled:
             raise OSError(errno.EIO, "the cable of the virtual bus was pulled")

@@ -50,6 +50,7 @@ class VirtualServo:
         self.profile = profile
         self.body = Body(profile.stall_torque, profile.voltage, angle, stiffness)
         self.table = bytearray(profile.size)
+        self._id_at = profile.register("id").address
         self.silent_until = -math.inf
         self._registered: tuple[int, bytes] | None = None
         self._alarms = 0
@@ -63,7 +64,7 @@ class VirtualServo:
     @property
     def id(self) -> int:
         """Its id on the bus."""
-        return self.get("id")
+        return self.table[self._id_at]
 
     @property
     def baud(self) -> int:

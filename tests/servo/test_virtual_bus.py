@@ -193,6 +193,19 @@ def test_half_a_packet_is_forgotten_after_silence():
     assert line.bus.read(10) == bytes.fromhex("FFFF010200FC")
 
 
+@pytest.mark.parametrize("profile", [AX, MX], ids=lambda profile: profile.model)
+def test_what_follows_a_corrupt_command_is_obeyed(profile):
+    line = Line(profile)
+    corrupt = bytearray(line.codec.pack(Packet(1, 1)))
+    corrupt[3 if profile is AX else 5] += 50  # a length that is not there
+    line.bus.write(bytes(corrupt))
+    sound = line.send(2, 1, wait=0.004)
+    assert sound == []
+    line.clock.sleep(0.01)
+    (answer,) = line.codec.parse(line.bus.read(100))[0]
+    assert answer.id == 2
+
+
 @pytest.mark.parametrize("kind", ["deaf", "dropped", "corrupted", "truncated", "late", "noise", "reset"])
 def test_troubles_of_answers_begin_and_end_as_told(kind):
     line = Line(troubles=[Trouble(kind, at=1.0, until=2.0, id=1)])
