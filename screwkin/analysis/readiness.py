@@ -139,7 +139,8 @@ def _same_robot(path: Path, trajectory: Trajectory, robot: str | Path | None) ->
     if now.text != table or told.get("sha256") != _sha(table):
         raise SafetyError(
             f"{path} was made for another table than {now.path}: the table of {now.name!r} changed "
-            f"since (SHA-256 {_sha(table)[:12]}… then, {_sha(now.text)[:12]}… now). Make it again"
+            f"since (SHA-256 {_sha(table)[:12]}… then, {_sha(now.text)[:12]}… now). "
+            "Make it again, or name the table it was made for: --robot FILE.toml"
         )
     if trajectory.joint_names != now.joint_names:
         raise SafetyError(f"{path} does not move the joints of {now.name} in the order of its table")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import typer
 
 from screwkin.cli import APP
+from screwkin.cli.bus_talk import bus_calibrate, bus_read, bus_scan
 from screwkin.cli.bus_virtual import virtual
 
 bus = typer.Typer(**APP)
@@ -15,4 +16,7 @@ def group() -> None:
     """Servos on a bus. Every verb here takes --json: one JSON object on stdout."""
 
 
+bus.command("scan")(bus_scan)
+bus.command("read")(bus_read)
+bus.command("calibrate")(bus_calibrate)
 bus.command("virtual")(virtual)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,8 +21,8 @@ from screwkin.servo.bus import Bus, open_line
 from screwkin.servo.gate import Bounds
 from screwkin.servo.player import Frames, Outcome, Player, PlaySettings, State, describe, frames_of
 from screwkin.servo.servo_map import ServoMap
+from screwkin.servo.virtual import virtual_servos
 from screwkin.servo.virtual_bus import SimulatedClock, VirtualBus
-from screwkin.servo.virtual_servo import VirtualServo
 
 _STATES: tuple[State, ...] = ("hold", "limp")
 _INTERRUPTED = 130
@@ -109,25 +108,8 @@ def _played(
 
 def _virtual_bus(may: Ready, servos: ServoMap) -> Bus:
     """Virtual servos of the robot in its posture ``home``, or at zero, on a simulated clock."""
-    home = [posture.q for posture in may.robot.postures if posture.name == "home"]
-    pose = home[0] if home else (0.0,) * len(servos.joints)
-    stiffness = may.robot.servos.get("stiffness", math.inf)
     clock = SimulatedClock()
-    line = VirtualBus(
-        [
-            VirtualServo(
-                servo.profile,
-                servo.id,
-                servo.direction * angle + servo.zero,
-                float(stiffness) if isinstance(stiffness, int | float) else math.inf,
-                servos.baud,
-                _RETURN_DELAY,
-            )
-            for servo, angle in zip(servos.joints, pose, strict=True)
-        ],
-        clock,
-        servos.baud,
-    )
+    line = VirtualBus(virtual_servos(may.robot, return_delay=_RETURN_DELAY), clock, servos.baud)
     return Bus(line, servos.protocol, servos.baud, clock)
 
 

@@ -19,6 +19,7 @@ from screwkin.servo.line import (
     REFUSED,
     BusError,
     Clock,
+    DamagedError,
     ErrorBit,
     Line,
     LineLostError,
@@ -287,8 +288,10 @@ class Bus:
             self.statistics.silent += silent
             self.statistics.corrupt += not silent
         self.statistics.failed += 1
-        how = "does not answer" if result == self._sdk.COMM_RX_TIMEOUT else "answers with damaged packets"
-        raise BusError(f"servo {id} {how} to a {what}, tried {1 + self.retries} times", id)
+        told = f"to a {what}, tried {1 + self.retries} times"
+        if result == self._sdk.COMM_RX_TIMEOUT:
+            raise BusError(f"servo {id} does not answer {told}", id)
+        raise DamagedError(f"servo {id} answers with damaged packets {told}", id)
 
     def _try(self, act: Callable[[], Any]) -> Any:
         """The driver's answer; bytes that it stumbles over are a damaged packet."""

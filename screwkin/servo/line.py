@@ -47,6 +47,10 @@ class BusError(NoSolutionError, OSError):
         super().__init__(message)
 
 
+class DamagedError(BusError):
+    """Something answers, but never a sound packet: noise, a wrong rate, or two servos with one id."""
+
+
 class LineLostError(BusError):
     """The port itself is gone: the cable or the adapter was pulled."""
 

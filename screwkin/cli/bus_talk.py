@@ -1,0 +1,160 @@
+"""``screwkin bus scan``, ``bus read`` and ``bus calibrate``: none of them moves a servo."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from screwkin.cli.options import AsJson
+from screwkin.cli.output import aligned, print_json, progress_bar, remark
+from screwkin.errors import InputError
+from screwkin.files import atomic_write
+from screwkin.model.robot import Robot
+from screwkin.model.table import load_robot
+from screwkin.servo.bus import Bus, open_line
+from screwkin.servo.calibrate import calibrated, turned, zeros
+from screwkin.servo.profiles import load_profile
+from screwkin.servo.servo_map import ServoMap
+from screwkin.servo.survey import BAUDS, IDS, PROTOCOLS, Found, differences, measured_angles, readings, scan
+
+Port = Annotated[str, typer.Option(help="Serial port of the servos, as /dev/ttyUSB0.")]
+Rs485 = Annotated[bool, typer.Option("--rs485", help="Let the kernel switch direction.")]
+_SCAN_PATIENCE = 0.010  # s
+
+
+def bus_scan(
+    port: Port,
+    robot: Annotated[str, typer.Option(help="Compare with the servos of this robot's table.")] = "",
+    baud: Annotated[int, typer.Option(help="Only this rate; default: the robot's, or all usual ones.")] = 0,
+    protocol: Annotated[float, typer.Option(help="Only this one: 1.0 or 2.0.")] = 0.0,
+    last: Annotated[int, typer.Option(help="Highest id to ask.")] = IDS[-1],
+    everything: Annotated[bool, typer.Option("--all", help="All rates and protocols, even so.")] = False,
+    rs485: Rs485 = False,
+    as_json: AsJson = False,
+) -> int:
+    """Who answers on a bus. With --robot every difference from its table is told, and the exit code is 3."""
+    servos = ServoMap.of(load_robot(robot)) if robot else None
+    if protocol not in (0.0, *PROTOCOLS):
+        raise InputError(f"--protocol {protocol} is none of servos; give 1.0 or 2.0")
+    if baud < 0 or last not in IDS:
+        raise InputError(f"--baud {baud} and --last {last}: give a rate above 0, and an id up to {IDS[-1]}")
+    own = servos is not None and not everything
+    bauds = (baud,) if baud else (servos.baud,) if servos and own else BAUDS
+    protocols = (protocol,) if protocol else (servos.protocol,) if servos and own else PROTOCOLS
+    found = _scanned(port, bauds, protocols, last, rs485)
+    wrong = differences(found, servos) if servos else []
+    if as_json:
+        rows = [
+            {"id": f.id, "model": f.name, "number": f.model, "protocol": f.protocol, "baud": f.baud}
+            for f in found
+        ]
+        print_json({"servos": rows, "differences": wrong})
+    else:
+        cells = [(f.id, f.name, f"protocol {f.protocol}", f"{f.baud} baud") for f in found]
+        print(aligned(cells, "  ") if cells else "no servo answers; are power and port right?")
+        for line in wrong:
+            print(line)
+    return 3 if wrong or not found else 0
+
+
+def bus_read(
+    port: Port,
+    robot: Annotated[str, typer.Option(help="Tell the joints of this robot.")] = "",
+    id: Annotated[int, typer.Option(help="Read all registers of this servo.")] = -1,
+    model: Annotated[str, typer.Option(help="Model of that servo, where no --robot tells it.")] = "",
+    baud: Annotated[int, typer.Option(help="Bits per second; default: the robot's, or 1000000.")] = 0,
+    rs485: Rs485 = False,
+    as_json: AsJson = False,
+) -> int:
+    """Read joint angles of a robot's servos, or with --id all registers of one servo. Nothing is written."""
+    if not robot and (id < 0 or not model):
+        raise InputError("tell what to read: --robot NAME, or --id N with --model NAME")
+    servos = ServoMap.of(load_robot(robot)) if robot else None
+    profile = load_profile(model) if model else servos.by_id(id).profile if servos and id >= 0 else None
+    speaks = profile.protocol if profile else servos.protocol if servos else 1.0
+    with _opened(port, baud or (servos.baud if servos else 1_000_000), speaks, rs485) as bus:
+        if profile is not None and id >= 0:
+            data = readings(bus, profile, id)
+            title = f"servo {id}, {profile.model}; rad, rad/s, s, V, degrees Celsius, shares of the torque"
+        elif servos is not None:
+            angles = measured_angles(bus, servos)
+            data = {s.joint: s.direction * (angles[s.joint] - s.zero) for s in servos.joints}
+            title = f"{servos.robot}: joint angles [rad]"
+        else:
+            raise InputError("--model needs --id")
+    if as_json:
+        print_json({"values": data})
+    else:
+        print(title)
+        print(aligned([(name, f"{value:.6g}") for name, value in data.items()], "  "))
+    return 0
+
+
+def bus_calibrate(
+    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="A bundled robot's name, or a table's path.")],
+    port: Port,
+    write: Annotated[Path, typer.Option(help="The table to write.", show_default=False)],
+    posture: Annotated[str, typer.Option(help="How the robot stands; zero: all joints at 0.")] = "zero",
+    flip: Annotated[list[str] | None, typer.Option(help="Joint whose direction is to be turned.")] = None,
+    baud: Annotated[int, typer.Option(help="Bits per second; default: the table's.")] = 0,
+    rs485: Rs485 = False,
+    as_json: AsJson = False,
+) -> int:
+    """Measure the servos' zero offsets with the robot held in a known posture, and write them into a table.
+
+    The servos are only read; hold them by hand, limp.
+    """
+    loaded = load_robot(robot)
+    servos = ServoMap.of(turned(loaded, flip or ()))
+    q = _posture(loaded, posture)
+    with _opened(port, baud or servos.baud, servos.protocol, rs485) as bus:
+        zero = zeros(servos, measured_angles(bus, servos), q)
+    text = calibrated(loaded, zero, flip or ())
+    with atomic_write(write) as file:
+        file.write(text)
+    if as_json:
+        print_json({"zero": zero, "flipped": list(flip or ()), "table": str(write)})
+    else:
+        print(aligned([(joint, f"{value:+.4f} rad") for joint, value in zero.items()], "  "))
+        print(f"written to {write}")
+        remark("Walks made with the old table are refused now: make and validate them again.")
+    return 0
+
+
+def _posture(robot: Robot, name: str) -> tuple[float, ...]:
+    if name == "zero" and name not in [posture.name for posture in robot.postures]:
+        return (0.0,) * len(robot.joints)
+    return robot.posture(name).q
+
+
+def _scanned(
+    port: str, bauds: tuple[int, ...], protocols: tuple[float, ...], last: int, rs485: bool
+) -> list[Found]:
+    found: list[Found] = []
+    total, done = len(bauds) * len(protocols) * (last + 1), 0
+    with progress_bar("scan") as share:
+        for baud in bauds:
+            for protocol in protocols:
+                with _opened(port, baud, protocol, rs485) as bus:
+                    bus.retries, bus.patience = 1, _SCAN_PATIENCE
+                    begun = done
+
+                    def tell(id: int, begun: int = begun) -> None:
+                        share((begun + id) / total)
+
+                    found += scan(bus, range(last + 1), tell)
+                done += last + 1
+    return found
+
+
+@contextmanager
+def _opened(port: str, baud: int, protocol: float, rs485: bool) -> Iterator[Bus]:
+    bus = Bus(open_line(port, baud, rs485), protocol, baud)
+    try:
+        yield bus
+    finally:
+        bus.close()

@@ -1,0 +1,132 @@
+"""Who is on a bus, and how that differs from the robot's table: all differences at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from screwkin.errors import InputError
+from screwkin.servo.budget import block_of
+from screwkin.servo.bus import Bus
+from screwkin.servo.line import BusError, DamagedError, LineLostError
+from screwkin.servo.profiles import Profile, load_profile, physical, profile_models
+from screwkin.servo.servo_map import ServoMap
+
+IDS = range(253)
+BAUDS = (1_000_000, 57_600, 115_200, 500_000, 200_000, 250_000, 400_000, 19_200, 9_600, 2_000_000, 3_000_000)
+PROTOCOLS = (1.0, 2.0)
+
+
+@dataclass(frozen=True)
+class Found:
+    """A servo that answered: model is its number, -1 where only damaged packets came."""
+
+    id: int
+    model: int
+    protocol: float
+    baud: int
+
+    @property
+    def name(self) -> str:
+        """The model's name, or its number where there is no profile."""
+        names = [name for name in profile_models() if load_profile(name).number == self.model]
+        return names[0] if names else f"model {self.model}"
+
+
+def scan(
+    bus: Bus, ids: Iterable[int] = IDS, progress: Callable[[int], None] = lambda id: None
+) -> list[Found]:
+    """Every servo that answers at the bus's rate and protocol.
+
+    Where two share an id their answers spoil each other; that is told as model -1.
+
+    Raises:
+        LineLostError: the port is gone.
+    """
+    found = []
+    for id in ids:
+        progress(id)
+        try:
+            number = bus.ping(id)
+            _spoiled(bus, id, number)
+        except LineLostError:
+            raise
+        except DamagedError:
+            number = -1
+        except BusError:
+            continue
+        found.append(Found(id, number, bus.protocol, bus.baud))
+    return found
+
+
+def _spoiled(bus: Bus, id: int, number: int) -> None:
+    """Read what differs between two servos of one id, if they are of a model that is known."""
+    for name in profile_models():
+        profile = load_profile(name)
+        if profile.number == number and profile.protocol == bus.protocol:
+            bus.read(id, *block_of(profile)[:2])
+
+
+def differences(found: Sequence[Found], servos: ServoMap) -> list[str]:
+    """How the servos found differ from the robot's table."""
+    return list(_differences({servo.id: servo for servo in found}, servos))
+
+
+def _differences(found: dict[int, Found], servos: ServoMap) -> Iterator[str]:
+    for joint in servos.joints:
+        who = f"{joint.joint} (servo {joint.id})"
+        servo = found.get(joint.id)
+        if servo is None:
+            yield f"{who} is missing"
+            continue
+        if servo.model < 0:
+            yield f"{who} answers with damaged packets: do two servos share its id?"
+        elif joint.profile.verified and servo.model != joint.profile.number:
+            yield f"{who} is a {servo.name}, the table has {joint.profile.model}"
+        if servo.protocol != servos.protocol:
+            yield f"{who} speaks protocol {servo.protocol}, the table has {servos.protocol}"
+        if servo.baud != servos.baud:
+            yield f"{who} is set to {servo.baud} baud, the table has {servos.baud}"
+    for id, servo in sorted(found.items()):
+        if id not in servos.ids:
+            yield f"servo {id} ({servo.name}) belongs to no joint of {servos.robot}"
+
+
+def readings(bus: Bus, profile: Profile, id: int) -> dict[str, float]:
+    """All registers of a servo, in SI where they have a unit.
+
+    Raises:
+        BusError: it does not answer.
+    """
+    data = bytearray(profile.size)
+    begin, most = 0, 64
+    while begin < profile.size:
+        length = min(most, profile.size - begin)
+        data[begin : begin + length] = bus.read(id, begin, length).data
+        begin += length
+    return {
+        name: physical(profile, name, int.from_bytes(data[r.address : r.end], "little"))
+        for name, r in profile.registers.items()
+    }
+
+
+def measured_angles(bus: Bus, servos: ServoMap) -> dict[str, float]:
+    """The angle of every servo from its centre [rad], by joint.
+
+    Raises:
+        InputError: servos that do not answer, all of them named.
+    """
+    angles, silent = {}, []
+    for joint in servos.joints:
+        register = joint.profile.register("present_position")
+        try:
+            raw = bus.read(joint.id, register.address, register.width).value
+        except LineLostError:
+            raise
+        except BusError:
+            silent.append(f"{joint.joint} (servo {joint.id})")
+            continue
+        angles[joint.joint] = physical(joint.profile, "present_position", raw)
+    if silent:
+        raise InputError(f"no answer from {', '.join(silent)}; screwkin bus scan tells who is there")
+    return angles
