@@ -121,6 +121,13 @@ def test_a_cut_packet_holds_nothing_up_after_silence(protocol):
     assert protocol.parse(cut, ended=True) == ([], b"")
 
 
+def test_a_length_beyond_any_servos_room_holds_nothing_up():
+    sound = Packet(1, 1)
+    assert protocol2.parse(hexed("FF FF FD 00 01 01 04 03") + protocol2.pack(sound)) == ([sound], b"")
+    waited = hexed("FF FF FD 00 01 00 04 03") + protocol2.pack(sound)
+    assert protocol2.parse(waited) == ([], waited)
+
+
 @BOTH
 def test_a_hundred_thousand_damaged_streams_never_deceive(protocol):
     """Every packet found is sound where it stands; the stream always ends; nothing is raised."""

@@ -163,7 +163,27 @@ def test_two_servos_of_one_id_talk_at_once():
     line.servos[1].put("id", 1)
     assert line.send(1, 1) == [Packet(1, 0)]  # the same bytes
     line.servos[1].body.angle = 0.7
-    assert line.send(1, 2, bytes((36, 2))) in ([], [Packet(1, 0, b"\x00\x02")])
+    told = []
+    for servo in line.servos:
+        servo._refresh()
+        told.append(line.codec.status(1, 0, servo.get("present_position").to_bytes(2, "little")))
+    line.bus.write(line.codec.pack(Packet(1, 2, bytes((36, 2)))))
+    line.clock.sleep(0.01)
+    assert line.bus.read(100) == bytes(a & b for a, b in zip(*told, strict=True))
+    assert told[0] != told[1]
+
+
+def test_torque_switched_on_holds_still_on_protocol_2_and_goes_to_the_goal_on_1():
+    for profile, ticks in ((MX, 2048), (AX, 700)):
+        line = Line(profile)
+        goal = profile.register("goal_position")
+        line.write(1, "goal_position", 700)
+        line.servos[0].put("torque_enable", 0)
+        line.servos[0].put(goal.name, 700)
+        line.servos[0].body.angle = 0.0
+        line.write(1, "torque_enable", 1)
+        line.clock.sleep(2.0)
+        assert line.read(1, "present_position") == ticks
 
 
 def test_a_servo_with_another_rate_is_silent():
