@@ -219,7 +219,7 @@ class Player:
     def _tune(self, patience: float) -> None:
         """In a play nobody waits long: a lost reply is asked for again in the next frame."""
         self.bus.retries = 0
-        self.bus.patience = min(patience, max(0.003, 3.0 * self.bus.statistics.mean))
+        self.bus.patience = min(patience, max(0.008, 3.0 * self.bus.statistics.mean))
 
     def _run(self, frames: Frames, pose: Array) -> None:
         start = self.bounds.within(pose)
@@ -288,7 +288,7 @@ class Player:
             self._read_group(goal)
             return
         for _ in range(len(self._queue)):
-            if self.bus.clock.now() + estimate > self._due:
+            if self.bus.clock.now() + 2.0 * estimate > self._due:  # the next may take longer than the mean
                 break
             k = self._queue.popleft()
             try:

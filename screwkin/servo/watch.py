@@ -71,7 +71,7 @@ class Thresholds:
     voltage_high: float = 1.25
     load: float = 0.95
     load_time: float = 0.5
-    lost: int = 3
+    lost: int = 5
     silence: int = 6
     late: float = 0.2
 
