@@ -24,7 +24,8 @@ def serving(*words):
     )
 
 
-def test_a_driver_of_another_process_finds_the_servos_of_the_robot(tmp_path):
+def test_a_driver_of_another_process_finds_the_servos_of_the_robot(tmp_path, monkeypatch):
+    monkeypatch.setattr("dynamixel_sdk.port_handler.LATENCY_TIMER", 250)  # ms; a busy computer is no time-out
     link = tmp_path / "servos"
     with serving("bioloid", "--link", link, "--posture", "zero") as process:
         try:

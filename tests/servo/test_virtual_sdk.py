@@ -47,7 +47,9 @@ class Opened:
 
 
 @pytest.fixture
-def opened() -> Iterator[Any]:
+def opened(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+    # The driver allows twice this, in ms, for an answer on its way: too little on a computer that is busy.
+    monkeypatch.setattr("dynamixel_sdk.port_handler.LATENCY_TIMER", 250)
     with ExitStack() as stack:
 
         def opening(model: str, count: int = 2, baud: int = 1_000_000) -> Opened:
