@@ -75,12 +75,12 @@ class _Port:
         return self.clock.now() > self.deadline or self.taken >= _MOST_NOISE
 
     def _guarded(self, act: Callable[[], Any]) -> Any:
-        """A line that fails is lost."""
+        """A line that fails is lost; pulled ports raise OSError, TypeError, or termios.error (neither)."""
         try:
             return act()
-        except (OSError, TypeError) as error:  # pyserial: a TypeError when its port is closed under it
-            if isinstance(error, ScrewkinError):
-                raise
+        except ScrewkinError:
+            raise
+        except Exception as error:
             raise LineLostError(f"the port is gone ({error}); is the cable plugged in?") from None
 
 

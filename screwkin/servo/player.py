@@ -160,11 +160,11 @@ class Player:
         fault: ServoFault | None = None
         final = Final("unknown", self.bounds.names)
         retries, patience = self.bus.retries, self.bus.patience
-        state = self.settings.on_fault
+        state, finished = self.settings.on_fault, False
         try:
             self._tune(patience)
             self._run(frames, pose)
-            state = self.settings.at_end
+            state, finished = self.settings.at_end, True
         except FaultFound as found:
             fault = found.fault
         except LineLostError as error:
@@ -175,7 +175,7 @@ class Player:
             fault = ServoFault("interrupted", "", -1, self._time(), "stopped by the user")
         finally:
             self.bus.retries, self.bus.patience = 1, min(patience, 0.005)
-            final = leave(self.gate, self.bus, state, self.settings.at_end == state and fault is None)
+            final = leave(self.gate, self.bus, state, finished)
             self.bus.retries, self.bus.patience = retries, patience
         faults = (fault,) if fault else ()
         return Outcome(self._frames, self._late, self.watch.max_tracking_error, faults, final, self.log)

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
+import signal
+import threading
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +15,11 @@ import pytest
 
 from screwkin.cli import run
 from screwkin.files import read_npz
+from screwkin.model.table import load_robot
+from screwkin.servo.line import MonotonicClock
+from screwkin.servo.virtual import virtual_servos
+from screwkin.servo.virtual_bus import VirtualBus
+from screwkin.servo.virtual_terminal import PseudoTerminal
 from screwkin.trajectory import load_trajectory
 
 
@@ -143,3 +152,34 @@ def test_servos_far_from_the_first_goal_are_refused_and_nothing_is_written(cli, 
     told = refused(cli("send", passed, "--virtual", "--go", "--far", "0.001", "-o", tmp_path / "out"), 4)
     assert "from its first goal" in told
     assert not (tmp_path / "out").exists()
+
+
+def played_until(cli, path: Path, out: Path, happens: Callable[[PseudoTerminal], None]):
+    """Play in true time over a pseudo-terminal, to which something happens after a moment of soft start."""
+    bus = VirtualBus(virtual_servos(load_robot("bioloid")), MonotonicClock())
+    with PseudoTerminal(bus) as terminal:
+        timer = threading.Timer(0.7, happens, [terminal])
+        timer.start()
+        called = cli("send", path, "--port", terminal.path, "--go", "--on-fault", "limp", "-o", out, "--json")
+        timer.join()
+    return called, bus
+
+
+def test_a_pulled_cable_ends_with_a_clear_error_and_a_log(cli, passed, tmp_path):
+    called, _ = played_until(cli, passed, tmp_path / "out", lambda terminal: terminal.close())
+    assert called.code == 4
+    assert "the port is gone" in called.err
+    assert "Switch their power off" in called.err
+    assert [fault["kind"] for fault in called.data["faults"]] == ["line"]
+    assert len(read_npz((tmp_path / "out" / "play.npz").read_bytes())["time"]) == called.data["frames"]
+
+
+def test_ctrl_c_brings_the_servos_to_rest_and_leaves_a_log(cli, passed, tmp_path):
+    called, bus = played_until(
+        cli, passed, tmp_path / "out", lambda terminal: os.kill(os.getpid(), signal.SIGINT)
+    )
+    assert called.code == 130
+    assert [fault["kind"] for fault in called.data["faults"]] == ["interrupted"]
+    assert called.data["state"] == "limp"
+    assert {servo.get("torque_enable") for servo in bus.servos} == {0}
+    assert (tmp_path / "out" / "play.npz").exists()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import termios
+
 import pytest
 
 from screwkin.errors import InputError, ScrewkinError
@@ -143,6 +145,18 @@ def test_a_pulled_cable_is_told_as_such():
     bus = bus_on(Recorded(OSError(5, "Input/output error")))
     with pytest.raises(LineLostError, match="cable"):
         bus.read(1, 36, 2)
+
+
+def test_whatever_a_pulled_port_raises_the_line_is_lost(monkeypatch):
+    """A terminal that is gone fails first where its input is to be forgotten, and with no OSError."""
+    line = Recorded()
+
+    def gone() -> None:
+        raise termios.error(5, "Input/output error")
+
+    monkeypatch.setattr(line, "reset_input_buffer", gone)
+    with pytest.raises(LineLostError, match="the port is gone"):
+        bus_on(line).read(1, 36, 2)
 
 
 def test_servos_that_do_not_answer_are_left_out_of_a_group():
