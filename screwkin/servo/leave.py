@@ -24,7 +24,7 @@ class Final:
     def sentence(self, count: int) -> str:
         """What the user should know."""
         if self.state == "unknown":
-            return "The servos cannot be reached: they hold their last goals. Switch their power off."
+            return "The servos do not answer: they may hold their last goals. Switch their power off."
         does = "hold their positions" if self.state == "hold" else "are limp"
         if self.unconfirmed:
             return (
