@@ -19,6 +19,8 @@ from screwkin.servo.virtual_bus import VirtualBus
 from screwkin.servo.virtual_servo import VirtualServo
 from screwkin.servo.virtual_terminal import PseudoTerminal
 
+pytestmark = pytest.mark.realtime
+
 ROBOT = load_robot("bioloid")
 Plug = Callable[[list[VirtualServo]], str]
 

@@ -165,6 +165,7 @@ def played_until(cli, path: Path, out: Path, happens: Callable[[PseudoTerminal],
     return called, bus
 
 
+@pytest.mark.realtime
 def test_a_pulled_cable_ends_with_a_clear_error_and_a_log(cli, passed, tmp_path):
     called, _ = played_until(cli, passed, tmp_path / "out", lambda terminal: terminal.close())
     assert called.code == 4
@@ -174,6 +175,7 @@ def test_a_pulled_cable_ends_with_a_clear_error_and_a_log(cli, passed, tmp_path)
     assert len(read_npz((tmp_path / "out" / "play.npz").read_bytes())["time"]) == called.data["frames"]
 
 
+@pytest.mark.realtime
 def test_ctrl_c_brings_the_servos_to_rest_and_leaves_a_log(cli, passed, tmp_path):
     called, bus = played_until(
         cli, passed, tmp_path / "out", lambda terminal: os.kill(os.getpid(), signal.SIGINT)

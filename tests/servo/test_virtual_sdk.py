@@ -18,6 +18,8 @@ from screwkin.servo.virtual_servo import VirtualServo
 from screwkin.servo.virtual_terminal import PseudoTerminal
 from screwkin.servo.virtual_trouble import Trouble
 
+pytestmark = pytest.mark.realtime
+
 REAL_TIME = SimpleNamespace(now=time.monotonic)
 MODELS = pytest.mark.parametrize("model", ["AX-12A", "MX-28", "MX-28-2"])
 TICKS_AT = {"AX-12A": 512, "MX-28": 2048, "MX-28-2": 2048}
