@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -21,9 +22,12 @@ def serving(*words):
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        # A shell lets its background jobs ignore Ctrl-C, and so would theirs.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
 
 
+@pytest.mark.realtime
 def test_a_driver_of_another_process_finds_the_servos_of_the_robot(tmp_path, monkeypatch):
     monkeypatch.setattr("dynamixel_sdk.port_handler.LATENCY_TIMER", 250)  # ms; a busy computer is no time-out
     link = tmp_path / "servos"
@@ -38,8 +42,12 @@ def test_a_driver_of_another_process_finds_the_servos_of_the_robot(tmp_path, mon
             assert driver.read2ByteTxRx(port, 13, 36)[0] == 512
             port.closePort()
         finally:
-            process.send_signal(2)
-        _, said = process.communicate(timeout=20)
+            process.send_signal(signal.SIGINT)
+        try:
+            _, said = process.communicate(timeout=20)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            raise
     assert process.returncode == 0
     assert not link.is_symlink()
     assert "answers" in said
