@@ -139,9 +139,7 @@ def momentum(robot: Robot, state: State, qd: Any, base_twist: Any = None) -> Arr
     _check_mass(robot)
     bodies, batch = _bodies(robot, state)
     h = newton_euler.momentum(bodies, joint_scalars(robot, "qd", qd), twist_of("base_twist", base_twist))
-    c = ZERO
-    for link, B in zip(robot.links, bodies.poses, strict=True):
-        c = c + (B @ link.com) * (link.mass / robot.mass)
+    c = mass.center_of_mass(robot, bodies.poses)
     h = wrench_at(c, h)
     return as_array(Twist(h.m, h.f), batch)
 

@@ -13,7 +13,6 @@ from screwkin.dynamics.support import Spike, spikes, support_margin
 from screwkin.dynamics.zmp import cart_table_zmp, zmp_from_wrench
 from screwkin.errors import InputError
 from screwkin.kinematics.mass import center_of_mass
-from screwkin.kinematics.positions import link_displacements
 from screwkin.model.robot import Robot
 from screwkin.screw import wrench_at
 from screwkin.se3 import Twist, Vector, as_array, pose_from_array, twist_from_array, unstack
@@ -93,7 +92,7 @@ def ground_reaction(
     wrench = ground_wrench(
         bodies, unstack(qd), unstack(qdd), twist_from_array(twist), twist_from_array(acceleration), GRAVITY
     )
-    com = T @ center_of_mass(robot, link_displacements(robot, scalars))
+    com = T.p + center_of_mass(robot, bodies.poses)
     rise = wrench.f * (1.0 / robot.mass)
     cart = cart_table_zmp(com, Vector(rise.x, rise.y, rise.z - GRAVITY), GRAVITY)
     about = wrench_at(-T.p, wrench)

@@ -25,6 +25,8 @@ from screwkin.gait.preview import CartMotion, follow_reference, preview_gains
 from screwkin.gait.realise import differentiate, positions, stance_of
 from screwkin.gait.record import Gait
 from screwkin.gait.stance import Stance
+from screwkin.kinematics.mass import center_of_mass
+from screwkin.kinematics.positions import link_displacements
 from screwkin.mechanism.mechanism import Mechanism
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
@@ -166,9 +168,9 @@ def _waist(gait: Gait, cart: CartMotion, phase: Motion) -> Motion:
 
 
 def _com(robot: Robot, made: Plan, q: Array) -> Array:
-    still = np.zeros_like(q)
-    rest = np.zeros((len(q), 6))
-    return ground_reaction(robot, made.T_world_base, q, still, still, rest, rest)[1]
+    """CoM of all links (T, 3) [m]."""
+    D = link_displacements(robot, unstack(q))
+    return np.asarray(as_array(pose_from_array(made.T_world_base) @ center_of_mass(robot, D), (len(q),)))
 
 
 def _followed(robot: Robot, mechanism: Mechanism, made: Plan, wanted: Array) -> tuple[Plan, Array]:
