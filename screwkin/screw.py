@@ -81,7 +81,47 @@ def displacement(screw: Screw, theta: Scalar) -> Pose:
     return Pose(turned, screw.s0 - turned @ screw.s0 + screw.s * times(screw.pitch, theta))
 
 
-def carry(pose: Pose, screw: Screw) -> Screw:
+@record
+class Displacement:
+    """A rigid displacement told by its rotation and by where it takes one point: ``seen`` goes to ``now``.
+
+    It serves wherever a ``Pose`` does. With the points on the axes, a product of screw displacements costs
+    what one of joint frames does: the way from axis to axis is a constant with few components.
+    """
+
+    R: Rotation
+    seen: Vector
+    now: Vector
+
+    @property
+    def p(self) -> Vector:
+        """Where it takes the origin."""
+        return self @ ZERO
+
+    def __matmul__(self, other: Any) -> Any:
+        if isinstance(other, Vector):
+            return self.now + self.R @ (other - self.seen)
+        return Pose(self.R @ other.R, self @ other.p)
+
+    @property
+    def inverse(self) -> Displacement:
+        """The displacement back."""
+        return Displacement(self.R.T, self.now, self.seen)
+
+
+AT_REST = Displacement(UNTURNED, ZERO, ZERO)
+
+
+def advance(before: Displacement, screw: Screw, theta: Scalar) -> Displacement:
+    """The displacement ``before``, after the screw's own: what the next body of a chain undergoes (eq. 3)."""
+    now = before @ screw.s0
+    if screw.is_translation:
+        return Displacement(before.R, screw.s0, now + before.R @ (screw.s * theta))
+    slide = screw.s * times(screw.pitch, theta)
+    return Displacement(before.R @ rotate(screw.s, theta), screw.s0, now + before.R @ slide)
+
+
+def carry(pose: Pose | Displacement, screw: Screw) -> Screw:
     """The screw where the pose takes it."""
     return Screw(pose.R @ screw.s, pose @ screw.s0, screw.pitch)
 

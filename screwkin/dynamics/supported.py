@@ -15,7 +15,7 @@ from screwkin.kinematics.mass import center_of_mass, com_jacobian
 from screwkin.kinematics.positions import frame_pose, joint_twists, link_displacements
 from screwkin.model.robot import Robot
 from screwkin.scalar import Scalar
-from screwkin.screw import at
+from screwkin.screw import Displacement, at
 from screwkin.se3 import ZERO, Pose, Twist, Vector, cross
 
 
@@ -33,7 +33,7 @@ class Supported:
     robot: Robot
     support: str
     base: Pose
-    displacements: list[Pose]
+    displacements: list[Displacement]
 
     @classmethod
     def of(cls, robot: Robot, support: str, T_world_support: Pose, q: Sequence[Scalar]) -> Supported:

@@ -6,11 +6,14 @@ from collections.abc import Sequence
 
 from screwkin.model.robot import Robot
 from screwkin.scalar import Scalar, plus
-from screwkin.screw import at
+from screwkin.screw import Displacement, at
 from screwkin.se3 import ZERO, Pose, Twist, Vector
 
+Placements = Sequence[Pose | Displacement]
+"""Where every link stands, in any frame."""
 
-def first_moment(robot: Robot, displacements: Sequence[Pose]) -> Vector:
+
+def first_moment(robot: Robot, displacements: Placements) -> Vector:
     """Sum of mass times CoM position over the links [kg m]."""
     total = ZERO
     for link, D in zip(robot.links, displacements, strict=True):
@@ -18,12 +21,12 @@ def first_moment(robot: Robot, displacements: Sequence[Pose]) -> Vector:
     return total
 
 
-def center_of_mass(robot: Robot, displacements: Sequence[Pose]) -> Vector:
+def center_of_mass(robot: Robot, displacements: Placements) -> Vector:
     """CoM of the whole robot, in the frame of ``displacements`` [m]."""
     return first_moment(robot, displacements) * (1 / robot.mass)
 
 
-def com_jacobian(robot: Robot, displacements: Sequence[Pose], twists: Sequence[Twist]) -> list[Vector]:
+def com_jacobian(robot: Robot, displacements: Placements, twists: Sequence[Twist]) -> list[Vector]:
     """Velocity of the CoM per unit rate of each joint: its subtree's share of the mass, on its screw."""
     mass: dict[str, Scalar] = {}
     moment: dict[str, Vector] = {}

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 from screwkin.model.robot import Robot
 from screwkin.scalar import Scalar
-from screwkin.screw import Screw, carry, displacement, transport
+from screwkin.screw import AT_REST, Displacement, Screw, advance, carry, displacement, transport
 from screwkin.se3 import IDENTITY, Pose, Twist
 
 
@@ -43,22 +43,27 @@ def chain_jacobian(screws: Sequence[Screw], thetas: Sequence[Scalar]) -> list[Tw
     return columns
 
 
-def link_displacements(robot: Robot, q: Sequence[Scalar]) -> list[Pose]:
+def link_displacements(robot: Robot, q: Sequence[Scalar]) -> list[Displacement]:
     """Displacement of every link from the zero pose, in the base frame, in the order of ``robot.links``."""
-    carried = {robot.base_link: IDENTITY}
+    carried = {robot.base_link: AT_REST}
     for i in robot.traversal:
         joint = robot.joints[i]
-        carried[joint.child] = carried[joint.parent] @ displacement(joint.screw, q[i])
+        carried[joint.child] = advance(carried[joint.parent], joint.screw, q[i])
     return [carried[name] for name in robot.link_names]
 
 
-def joint_twists(robot: Robot, displacements: Sequence[Pose], T: Pose = IDENTITY) -> list[Twist]:
-    """Every joint's normalised screw where it is now, in the frame to which T takes base coordinates."""
+def joint_screws(robot: Robot, displacements: Sequence[Displacement], T: Pose = IDENTITY) -> list[Screw]:
+    """Every joint's screw where it is now, in the frame to which T takes base coordinates."""
     carried = dict(zip(robot.link_names, displacements, strict=True))
-    return [transport(T @ carried[joint.parent], joint.screw.twist) for joint in robot.joints]
+    return [carry(T, carry(carried[joint.parent], joint.screw)) for joint in robot.joints]
 
 
-def frame_pose(robot: Robot, displacements: Sequence[Pose], name: str) -> Pose:
+def joint_twists(robot: Robot, displacements: Sequence[Displacement], T: Pose = IDENTITY) -> list[Twist]:
+    """The same screws as normalised twists."""
+    return [screw.twist for screw in joint_screws(robot, displacements, T)]
+
+
+def frame_pose(robot: Robot, displacements: Sequence[Displacement], name: str) -> Pose:
     """Pose of ``base``, a link or a tip in the base frame."""
     link, home = robot.frame(name)
     return displacements[robot.link_names.index(link)] @ home

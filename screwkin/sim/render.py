@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from screwkin.kinematics.positions import link_displacements
 from screwkin.model.robot import Robot
 from screwkin.model.urdf import link_colours
-from screwkin.se3 import Vector, as_array, unstack
+from screwkin.se3 import IDENTITY, Vector, as_array, unstack
 from screwkin.sim.backend import Array
 from screwkin.sim.camera import Camera, Picture, View, following, view_of
 
@@ -50,7 +50,8 @@ def pictures(robot: Robot, time: Array, T_world_base: Array, q: Array, camera: C
 
 def _boxes(robot: Robot, T_world_base: Array, q: Array) -> tuple[Array, Array]:
     """Corners (K, boxes, 8, 3) in the world, and colours (boxes, 3) [0, 1]."""
-    displacements = as_array(link_displacements(robot, unstack(np.asarray(q, dtype=float))))
+    carried = link_displacements(robot, unstack(np.asarray(q, dtype=float)))
+    displacements = as_array([D @ IDENTITY for D in carried])
     paint = link_colours(robot)
     corners, colours = [], []
     for i, link in enumerate(robot.links):
