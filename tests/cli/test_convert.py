@@ -7,7 +7,7 @@ from screwkin.kinematics.positions import link_displacements
 from screwkin.model.dh_csv import load_dh
 from screwkin.model.table import load_robot
 from screwkin.model.urdf_in import load_urdf
-from screwkin.se3 import as_array
+from screwkin.se3 import IDENTITY, as_array
 from tests.model.chains import fk_by_matrices
 
 
@@ -15,7 +15,7 @@ def displacement(robot, q):
     """Displacement of the right foot's link, whatever it is called."""
     displaced = link_displacements(robot, [q[name] for name in robot.joint_names])
     child = robot.joint("right_ankle_roll").child
-    return as_array(displaced[robot.link_names.index(child)])
+    return as_array(displaced[robot.link_names.index(child)] @ IDENTITY)
 
 
 @pytest.mark.parametrize("first", [".toml", ".urdf", ".csv"])
