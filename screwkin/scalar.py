@@ -5,7 +5,7 @@ symbols. A Python ``int`` 0, 1 or -1 is *structure* of a mechanism (an axis alon
 ``plus`` and ``times`` fold it away instead of computing with it.
 
 A foreign scalar type takes part by an attribute ``__scalar_namespace__`` holding an object with the
-functions ``sin cos sqrt atan2 where``.
+functions ``sin cos sqrt atan2 where``, and ``arc`` if it has one.
 """
 
 from __future__ import annotations
@@ -143,6 +143,12 @@ def sqrt(x: Scalar) -> Scalar:
 def atan2(y: Scalar, x: Scalar) -> Scalar:
     """Angle of the point (x, y), in (-pi, pi]."""
     return namespace(x, y).atan2(y, x)
+
+
+def arc(s: Scalar, c: Scalar) -> Scalar:
+    """Angle of a point of the unit circle, from its sine and cosine; a graph keeps these two for later."""
+    functions = namespace(s, c)
+    return getattr(functions, "arc", functions.atan2)(s, c)
 
 
 def where(condition: Any, a: Scalar, b: Scalar) -> Scalar:

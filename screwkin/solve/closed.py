@@ -12,11 +12,12 @@ from typing import Any, Literal
 import numpy as np
 
 from screwkin.errors import InputError
-from screwkin.se3 import Vector, pose_from_array
+from screwkin.scalar import Scalar
+from screwkin.se3 import Pose, Vector, pose_from_array
 from screwkin.solve.chain import Chain, distance, missing
 from screwkin.solve.limb_geometry import meeting, parallel_axes_faults, spherical_hip_faults
 from screwkin.solve.newton import newton
-from screwkin.solve.parallel_axes import parallel_axes_branches
+from screwkin.solve.parallel_axes import parallel_axes_branches, parallel_axes_points
 from screwkin.solve.spherical_hip import spherical_hip_branches
 
 Array = Any
@@ -47,16 +48,34 @@ class ClosedForm:
         blocks = [self._block(target[i : i + BLOCK]) for i in range(0, len(target), BLOCK)]
         return np.concatenate(blocks) if blocks else np.zeros((0, 8, 6))
 
-    def _block(self, target: Array) -> Array:
-        chain = self.chain.reversed if self.backwards else self.chain
-        D = pose_from_array(np.asarray(target)) @ self.chain.tip.inverse
-        if self.backwards:
-            D = D.inverse
+    def formula(self, target: Pose) -> list[tuple[Scalar, ...]]:
+        """All eight branches of a pose on any scalar: six angles in the limb's order, and the branch's slack.
+
+        The slack is negative where the branch is no solution, and near 0 where rounding leaves few digits.
+        """
+        chain, D = self._walked(target)
         if self.family == "spherical hip":
-            assert self.hip is not None
-            assert self.ankle is not None
-            sets = spherical_hip_branches(chain.screws, self.hip, self.ankle, D)
-            q = np.stack([np.stack(np.broadcast_arrays(*branch)) for branch in sets])
+            sets = self._spherical(chain, D)
+        else:
+            sets = parallel_axes_points(chain.screws, D, chain.length)
+        order = slice(None, None, -1) if self.backwards else slice(None)
+        return [(*branch[:6][order], branch[6]) for branch in sets]
+
+    def _walked(self, target: Pose) -> tuple[Chain, Pose]:
+        """The chain as its family walks it, and how far it displaces its tip link."""
+        D = target @ self.chain.tip.inverse
+        return (self.chain.reversed, D.inverse) if self.backwards else (self.chain, D)
+
+    def _spherical(self, chain: Chain, D: Pose) -> list[tuple[Scalar, ...]]:
+        assert self.hip is not None
+        assert self.ankle is not None
+        return spherical_hip_branches(chain.screws, self.hip, self.ankle, D)
+
+    def _block(self, target: Array) -> Array:
+        chain, D = self._walked(pose_from_array(np.asarray(target)))
+        if self.family == "spherical hip":
+            sets = self._spherical(chain, D)
+            q = np.stack([np.stack(np.broadcast_arrays(*angles)) for *angles, _ in sets])
         else:
             q = parallel_axes_branches(chain.screws, D, chain.length)
         q = np.moveaxis(q, -1, 0)

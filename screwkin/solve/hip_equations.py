@@ -75,12 +75,11 @@ class HipEquations:
             dot(last.s, pitch.s),
         )
 
-    def quartic(self) -> tuple[Scalar, ...]:
-        """Coefficients of 1, cos q1, sin q1, cos 2 q1, sin 2 q1 of a function that is zero where |n| = 1.
+    def solution(self) -> tuple[Turning, list[Scalar]]:
+        """N and d with n = N/d: Cramer's rule for the three equations.
 
-        By Cramer's rule n = N/d with N = level (reach x ankle) + offset (ankle x axis) + tilt (axis x reach)
-        and d = ankle . (axis x reach). In axis x reach the hip's own part turns rigidly, so that N and d are
-        of first degree, and |N|^2 - d^2 of second degree, in cos q1 and sin q1.
+        N = level (reach x ankle) + offset (ankle x axis) + tilt (axis x reach), d = ankle . (axis x reach).
+        In axis x reach the hip's own part turns rigidly: both are of first degree in cos q1 and sin q1.
         """
         axis, reach = self.axis, self.reach
         plane = Turning(
@@ -94,7 +93,11 @@ class HipEquations:
             axis.through(lambda v: cross(self.ankle, v) * self.offset),
             plane.through(lambda v: v * self.tilt),
         )
-        d = [dot(self.ankle, v) for v in (plane.fixed, plane.along, plane.across)]
+        return N, [dot(self.ankle, v) for v in (plane.fixed, plane.along, plane.across)]
+
+    def quartic(self) -> tuple[Scalar, ...]:
+        """Coefficients of 1, cos q1, sin q1, cos 2 q1, sin 2 q1 of |N|^2 - d^2, zero where |n| = 1."""
+        N, d = self.solution()
         one = minus(dot(N.fixed, N.fixed), times(d[0], d[0]))
         cosine = times(2, minus(dot(N.fixed, N.along), times(d[0], d[1])))
         sine = times(2, minus(dot(N.fixed, N.across), times(d[0], d[2])))

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from screwkin.scalar import Scalar
+from screwkin.scalar import Scalar, atan2, where
 from screwkin.screw import Screw, displacement
 from screwkin.se3 import Pose, Vector, cross, dot, map_scalars, norm, rotate
 from screwkin.solve.hip_equations import HipEquations, chosen, pitch_directions
 from screwkin.solve.planar_triangle import flattened, planar_branches
-from screwkin.solve.quartic import circle_roots
-from screwkin.solve.subproblems import turn_onto
+from screwkin.solve.quartic import circle_points, circle_roots
+from screwkin.solve.subproblems import least, turn_onto
 
 Array = Any
 
@@ -150,6 +150,31 @@ def parallel_axes_branches(screws: Sequence[Screw], D: Pose, length: float) -> A
     q1, q6 = hip_solutions(screws, D, length)
     q2, E = _planar_part(screws, D, q1, q6)
     sets = []
-    for q3, q4, q5 in planar_branches(screws[2:5], E):
+    for q3, q4, q5, _ in planar_branches(screws[2:5], E):
         sets.append(np.stack(np.broadcast_arrays(q1, q2, q3, q4, q5, q6), axis=1))
     return np.concatenate(sets)
+
+
+def parallel_axes_points(screws: Sequence[Screw], D: Pose, length: float) -> list[tuple[Scalar, ...]]:
+    """The eight sets of ``parallel_axes_branches`` as a formula on any scalar, where roots are apart.
+
+    Returns:
+        Six angles a set and its slack: negative where it is no solution, near 0 where roots, or the
+        directions that fix the hip, nearly fall together (there ``parallel_axes_branches`` serves).
+    """
+    equations = HipEquations.of(screws, D)
+    N, d = equations.solution()
+    s1, s2, y, s6 = screws[0], screws[1], screws[2].s, screws[5]
+    branches = []
+    for point in circle_points(equations.quartic()):
+        c, s = point.c, point.s
+        volume = d[0] + d[1] * c + d[2] * s
+        apart = volume * volume / length**2
+        n = N.at(c, s) / where(apart > 0, volume, 1.0)
+        q1, q6 = atan2(s, c), -turn_onto(s6.s, y, D.R.T @ n)
+        q2 = turn_onto(s2.s, y, rotate(s1.s, -q1) @ n)
+        hip = displacement(s1, q1) @ displacement(s2, q2)
+        E = hip.inverse @ D @ displacement(s6, -q6)
+        for q3, q4, q5, slack in planar_branches(screws[2:5], E):
+            branches.append((q1, q2, q3, q4, q5, q6, least(least(slack, point.slack), apart)))
+    return branches

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from screwkin.scalar import Scalar, minus, times
 from screwkin.screw import Screw
 from screwkin.se3 import Pose, Vector, dot, rotate
-from screwkin.solve.subproblems import turn_onto, turns_to_level
+from screwkin.solve.subproblems import level_turns, turn_onto
 
 
 def flattened(normal: Vector, a: Vector) -> Vector:
@@ -15,8 +15,10 @@ def flattened(normal: Vector, a: Vector) -> Vector:
     return a - normal * dot(normal, a)
 
 
-def planar_branches(screws: Sequence[Screw], E: Pose) -> list[tuple[Scalar, Scalar, Scalar]]:
+def planar_branches(screws: Sequence[Screw], E: Pose) -> list[tuple[Scalar, Scalar, Scalar, Scalar]]:
     """Both triples of positions of three parallel revolute axes that make the planar displacement E.
+
+    The fourth scalar tells how far inside reach they are (see ``subproblems.level_turns``).
 
     Args:
         screws: the axes in the zero pose, no two neighbours on one line.
@@ -30,9 +32,10 @@ def planar_branches(screws: Sequence[Screw], E: Pose) -> list[tuple[Scalar, Scal
     # |upper + R4 lower| = |wanted|
     level = times(minus(minus(dot(wanted, wanted), dot(upper, upper)), dot(lower, lower)), 0.5)
     branches = []
-    for bend in turns_to_level(knee.s, lower, upper, level):
+    *bends, slack = level_turns(knee.s, lower, upper, level)
+    for bend in bends:
         turned = rotate(knee.s, bend)
         lift = turn_onto(hip.s, upper + turned @ lower, wanted)
         rest = (rotate(hip.s, lift) @ turned).T @ E.R
-        branches.append((lift, bend, turn_onto(ankle.s, upper, rest @ upper)))
+        branches.append((lift, bend, turn_onto(ankle.s, upper, rest @ upper), slack))
     return branches

@@ -8,7 +8,7 @@ is a tip whose chain imposes its translations and lets its rotations monitor: th
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -60,6 +60,20 @@ class PoseSolution:
     def ok(self) -> bool:
         """Every limb of every sample converged."""
         return bool((self.status == Status.CONVERGED).all())
+
+    def replaced(self, samples: Array, other: PoseSolution) -> PoseSolution:
+        """This solution with some samples (flat indices) taken from another one, a batch of just these."""
+        count = int(np.prod(self.status.shape[:-1]))
+
+        def mixed(mine: Array, theirs: Array, inner: tuple[int, ...]) -> Array:
+            flat = mine.reshape(count, *inner).copy()
+            flat[samples] = theirs
+            return flat.reshape(mine.shape)
+
+        names = ("status", "residual", "distance", "angle", "iterations", "worst_joint")
+        parts = {n: mixed(getattr(self, n), getattr(other, n), (len(self.limbs),)) for n in names}
+        q = mixed(self.state.q, other.state.q, self.state.q.shape[-1:])
+        return replace(self, state=State(self.state.T_world_base, q), **parts)
 
     def raise_on_failure(self, robot: Robot, time: Array | None = None) -> None:
         """Raise for the first sample that did not converge, naming limb, sample and how far.
@@ -182,6 +196,33 @@ def solve_pose(robot: Robot, targets: Mapping[str, Array], guess: State) -> Pose
         shaped["angle"],
         shaped["iterations"].astype(int),
         shaped["worst_joint"].astype(int),
+    )
+
+
+def judged(robot: Robot, tips: Sequence[str], base: Array, q: Array, error: Array) -> PoseSolution:
+    """The solution of positions q (..., n) found in closed form with errors (..., tips): limits are asked.
+
+    Args:
+        robot: the robot.
+        tips: names of the tips with a target.
+        base: pose of the base, broadcast to the batch.
+        q: joint positions.
+        error: what lacks to every target [m and rad, norm].
+    """
+    batch, limbs = q.shape[:-1], [robot.limb(name) for name in tips]
+    flat, shape = q.reshape(-1, q.shape[-1]), (int(np.prod(batch)), len(limbs))
+    parts = {"status": np.full(shape, Status.CONVERGED), "worst_joint": np.zeros(shape, dtype=int)}
+    for row, limb in enumerate(limbs):
+        _judge(robot, row, list(robot.path_to(limb.link)), flat, parts)
+    return PoseSolution(
+        State(np.broadcast_to(base, (*batch, 4, 4)), q),
+        tuple(limb.name for limb in limbs),
+        parts["status"].reshape(error.shape).astype(int),
+        error,
+        error,
+        np.zeros_like(error),
+        np.ones(error.shape, dtype=int),
+        parts["worst_joint"].reshape(error.shape),
     )
 
 

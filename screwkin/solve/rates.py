@@ -40,6 +40,11 @@ def block_name(mechanism: Mechanism, circuits: Sequence[int]) -> str:
     return " + ".join(mechanism.circuit_names[c] for c in circuits)
 
 
+def block_names(mechanism: Mechanism) -> tuple[str, ...]:
+    """Names of all blocks, in their order."""
+    return tuple(block_name(mechanism, circuits) for circuits, _ in mechanism.blocks)
+
+
 def block_rows(circuits: Sequence[int]) -> list[int]:
     """Rows of N that belong to the circuits."""
     return [6 * c + r for c in circuits for r in range(6)]
@@ -80,7 +85,7 @@ def solve_secondary(mechanism: Mechanism, N: Array, right: Array) -> SecondarySo
             x = (np_.linalg.pinv(A, rcond=RANK_TOLERANCE) @ b)[..., 0]
         parts += [(i, x[..., k]) for k, i in enumerate(inside)]
         sigmas.append(sigma)
-    names = tuple(block_name(mechanism, circuits) for circuits, _ in mechanism.blocks)
+    names = block_names(mechanism)
     if not parts:  # nothing follows: a tree without tips
         nothing = np_.zeros((*right.shape[:-1], 0))
         return SecondarySolution(nothing, nothing, names)

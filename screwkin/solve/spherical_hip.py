@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from screwkin.scalar import Scalar, minus, times
 from screwkin.screw import Screw
 from screwkin.se3 import Pose, Vector, dot, rotate
-from screwkin.solve.subproblems import three_turns, turns_to_level, two_turns
+from screwkin.solve.subproblems import least, level_turns, three_turns, two_turns
 
 
 def spherical_hip_branches(
@@ -27,6 +27,9 @@ def spherical_hip_branches(
         hip: point [m].
         ankle: point [m].
         D: wanted displacement; out of reach, the limb is stretched (or folded) towards it.
+
+    Returns:
+        Six angles a set, and how far inside reach it is (see ``subproblems.level_turns``).
     """
     s1, s2, s3, s4, s5, s6 = (screw.s for screw in screws)
     knee = screws[3].s0
@@ -35,10 +38,12 @@ def spherical_hip_branches(
     # D4 D5 D6 takes the hip as the foot sees it to the hip: |R4^T thigh - shank| = |seen|.
     level = times(minus(dot(thigh, thigh) + dot(shank, shank), dot(seen, seen)), 0.5)
     branches = []
-    for back in turns_to_level(s4, thigh, shank, level):
+    *bends, reach = level_turns(s4, thigh, shank, level)
+    for back in bends:
         bent = rotate(s4, back) @ thigh - shank
-        for q5, q6 in two_turns(s5, s6, seen, bent):
+        for q5, q6, ankle_slack in two_turns(s5, s6, seen, bent):
             foot = rotate(s4, -back) @ rotate(s5, q5) @ rotate(s6, q6)
-            for q1, q2, q3 in three_turns(s1, s2, s3, D.R @ foot.T):
-                branches.append((q1, q2, q3, -back, q5, q6))
+            for q1, q2, q3, hip_slack in three_turns(s1, s2, s3, D.R @ foot.T):
+                slack = least(reach, least(ankle_slack, hip_slack))
+                branches.append((q1, q2, q3, -back, q5, q6, slack))
     return branches

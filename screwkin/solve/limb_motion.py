@@ -1,0 +1,127 @@
+"""Rates and accelerations of a limb's joints from the motions of base and tip, told where they are simplest.
+
+Screws are constant on their own links, so in the axes of a link amid the limb most of their components are 0:
+only the wanted motion is turned there. Formulas over records, any scalar.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from screwkin.kinematics.positions import frame_pose
+from screwkin.model.robot import Limb, Robot
+from screwkin.scalar import Scalar
+from screwkin.screw import AT_REST, Displacement, Screw, advance, carry
+from screwkin.se3 import Pose, Rotation, Twist, Vector, bracket, cross
+from screwkin.solve.chain import Chain
+from screwkin.solve.limb_rates import Split, point_rates, pose_rates, split_of
+
+
+@dataclass(frozen=True)
+class LimbMotion:
+    """A limb of six joints, whose tip follows a twist, or of three, whose tip follows a velocity.
+
+    Attributes:
+        path: indices of its joints in q.
+        split: see ``limb_rates``; None for three joints.
+        length: of the limb [m].
+        tip: pose of the tip; world axes, from the base origin.
+        point: where screws are told: the split's point, or the tip of three joints; world axes, likewise.
+        axes: from the axes of the link in which screws are told to world axes.
+        twists: the screws, in the link's axes at the point.
+    """
+
+    path: tuple[int, ...]
+    split: Split | None
+    length: float
+    tip: Pose
+    point: Vector
+    axes: Rotation
+    twists: tuple[Twist, ...]
+
+    @classmethod
+    def of(
+        cls, robot: Robot, limb: Limb, D: Sequence[Displacement], q: Sequence[Scalar], joints: int
+    ) -> LimbMotion:
+        """The limb where ``D`` (world axes, from the base origin) has its links.
+
+        Args:
+            robot: the robot.
+            limb: one of its limbs.
+            D: displacements of all links.
+            q: joint positions.
+            joints: number of the limb's joints before the link in whose axes screws are told.
+        """
+        chain = Chain.of(robot, limb.name)
+        split, path = split_of(chain), chain.joints
+        carried = dict(zip(robot.link_names, D, strict=True))
+        links = [robot.joints[path[0]].parent, *(robot.joints[i].child for i in path)]
+        seen = seen_from(chain.screws, [q[i] for i in path], joints)
+        tip = frame_pose(robot, D, limb.tip)
+        if len(path) == 6:
+            at_joint = split.first if split else 0
+            fixed = split.point if split else chain.screws[0].s0
+            point, here = carried[links[at_joint]] @ fixed, seen[at_joint] @ fixed
+        else:
+            point, here = tip.p, seen[-1] @ limb.frame.p
+        screws = [carry(d, screw) for d, screw in zip(seen, chain.screws, strict=False)]
+        told = tuple(Screw(s.s, s.s0 - here, s.pitch).twist for s in screws)
+        return cls(path, split, chain.length, tip, point, carried[links[joints]].R, told)
+
+    def _turned(self, omega: Vector, v: Vector) -> Twist:
+        back = self.axes.T
+        return Twist(back @ omega, back @ v)
+
+    def _solved(self, wanted: Twist) -> tuple[list[Scalar], Scalar]:
+        if len(self.path) == 6:
+            return pose_rates(self.twists, self.split, wanted, self.length)
+        return point_rates(self.twists, wanted.v, self.length)
+
+    def _here(self, tip: Twist) -> Vector:
+        """Velocity at the point of a body that moves with a twist told at the tip."""
+        return tip.v + cross(tip.omega, self.point - self.tip.p)
+
+    def rates(self, base: Twist, tip: Twist) -> tuple[list[Scalar], Scalar]:
+        """Joint rates, and the limb's determinant.
+
+        Args:
+            base: its twist, told at the base origin, world axes.
+            tip: twist told at the tip's origin; of three joints only its velocity matters.
+        """
+        v = self._here(tip) - (base.v + cross(base.omega, self.point))
+        return self._solved(self._turned(tip.omega - base.omega, v))
+
+    def accelerations(
+        self, base: Twist, tip: Twist, base_rate: Twist, tip_rate: Twist, rates: Sequence[Scalar]
+    ) -> list[Scalar]:
+        """Joint accelerations; ``base_rate`` and ``tip_rate`` are the derivatives of the two twists."""
+        p = self.point
+        V = self._turned(base.omega, base.v + cross(base.omega, p))
+        spin = base_rate.v - cross(base.omega, base.v)
+        known = self._turned(base_rate.omega, spin + cross(base_rate.omega, p))
+        for twist, rate in zip(self.twists, rates, strict=True):
+            known = known + bracket(V, twist) * rate
+            V = V + twist * rate
+        # A fixed point's spatial acceleration is the body point's, less alpha x r and omega x its velocity.
+        if len(self.path) == 6:
+            alpha, r = tip_rate.omega, p - self.tip.p
+            v = tip_rate.v - cross(tip.omega, tip.v) + cross(alpha, r)
+            wanted = self._turned(alpha, v)
+        else:
+            back = self.axes.T
+            wanted = Twist(known.omega, back @ tip_rate.v - cross(V.omega, V.v))
+        return self._solved(wanted - known)[0]
+
+
+def seen_from(screws: Sequence[Screw], q: Sequence[Scalar], joints: int) -> list[Displacement]:
+    """Displacements of a chain's links, base first, relative to the link after that many joints.
+
+    The zero pose is the frame of reference: the link itself is at rest.
+    """
+    inward, outward = [AT_REST], [AT_REST]
+    for k in reversed(range(joints)):
+        inward.append(advance(inward[-1], screws[k], -q[k]))
+    for k in range(joints, len(screws)):
+        outward.append(advance(outward[-1], screws[k], q[k]))
+    return [*inward[:0:-1], *outward]
