@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Iterator
+from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy is loaded: pytest-xdist has the cores
 os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
+os.environ.setdefault("SCREWKIN_CACHE", str(Path(tempfile.gettempdir()) / f"screwkin-tests-{os.getuid()}"))
 
 import pytest
 from hypothesis import HealthCheck, settings

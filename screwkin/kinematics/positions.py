@@ -43,9 +43,12 @@ def chain_jacobian(screws: Sequence[Screw], thetas: Sequence[Scalar]) -> list[Tw
     return columns
 
 
-def link_displacements(robot: Robot, q: Sequence[Scalar]) -> list[Displacement]:
-    """Displacement of every link from the zero pose, in the base frame, in the order of ``robot.links``."""
-    carried = {robot.base_link: AT_REST}
+def link_displacements(robot: Robot, q: Sequence[Scalar], base: Displacement = AT_REST) -> list[Displacement]:
+    """Displacement of every link from the zero pose, in the order of ``robot.links``.
+
+    Told in the base frame; or in the frame to which ``base`` displaces it, all at the price of one.
+    """
+    carried = {robot.base_link: base}
     for i in robot.traversal:
         joint = robot.joints[i]
         carried[joint.child] = advance(carried[joint.parent], joint.screw, q[i])

@@ -1,0 +1,187 @@
+"""Kernels of limbs: closed-form inverse kinematics, of one limb or of the whole body.
+
+What rounding leaves in doubt is marked, so that the algorithms of ``solve`` decide there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import cache
+
+from screwkin import scalar
+from screwkin.errors import InputError
+from screwkin.kernel.body import best_link
+from screwkin.kernel.program import Program, Recorder
+from screwkin.kernel.records import identifier, pose_input
+from screwkin.model.robot import Robot
+from screwkin.scalar import Scalar, where
+from screwkin.screw import AT_REST, Screw, advance, carry
+from screwkin.se3 import NO_TWIST, UNTURNED, ZERO, Pose, Vector, dot
+from screwkin.solve.chain import Chain
+from screwkin.solve.closed import closed_form
+from screwkin.solve.limb_motion import seen_from
+from screwkin.solve.limb_rates import point_rates, pose_rates, split_of
+from screwkin.solve.point_limb import point_branches, shoulder_of
+from screwkin.solve.quartic import abs_
+
+DOUBT = 1e-8
+"""Slack of a branch below which it is left to the algorithms that keep their digits there."""
+FOUND = (
+    "found: 1 if there is a solution, 0 if there is none (then q is the guess), -1 if rounding leaves it open"
+)
+
+
+@cache
+def limb_branches(robot: Robot, limb: str) -> Program:
+    """All branches of a limb's closed form, and how far each is from the target pose."""
+    chain = Chain.of(robot, limb)
+    recorder = Recorder(
+        identifier(robot.name, chain.limb, "ik"),
+        f"All branches of {chain.limb} of {robot.name} for poses of its tip in the base frame; error: what"
+        " lacks to the pose [m and rad, norm]; slack: how far inside reach, in doubt near 0.",
+    )
+    target = pose_input(recorder, "T_base_tip")
+    branches = closed_form(chain).formula(target)
+    recorder.output(
+        "q", [x for *q, _ in branches for x in wrapped(chain, q)], len(branches), len(chain.names)
+    )
+    recorder.output("error", [gap(chain, q, target) for *q, _ in branches])
+    recorder.output("slack", [slack for *_, slack in branches])
+    return recorder.program()
+
+
+@cache
+def limb_nearest(robot: Robot, limb: str) -> Program:
+    """The solution of a limb's closed form that is nearest to a guess."""
+    chain = Chain.of(robot, limb)
+    recorder = Recorder(
+        identifier(robot.name, chain.limb, "nearest"),
+        f"The solution of {chain.limb} of {robot.name} nearest to a guess, for a pose of its tip in the base"
+        f" frame; error: what lacks to the pose [m and rad, norm]; {FOUND}.",
+    )
+    target, guess = pose_input(recorder, "T_base_tip"), recorder.input("guess", len(chain.names))
+    q, found = nearest_branch(chain, closed_form(chain).formula(target), guess)
+    recorder.output("q", q)
+    recorder.output("error", [gap(chain, q, target)])
+    recorder.output("found", [found])
+    return recorder.program()
+
+
+@cache
+def solvable(robot: Robot, tip: str, pose: bool) -> bool:
+    """True if a limb's pose (or its tip's position) has a closed form."""
+    chain = Chain.of(robot, tip)
+    if not pose:
+        return shoulder_of(chain) is not None
+    try:
+        closed_form(chain)
+    except InputError:
+        return False
+    return True
+
+
+@cache
+def whole_body(robot: Robot, targets: tuple[tuple[str, bool], ...]) -> Program:
+    """Joint positions that put several tips where they are wanted, each limb by its closed form.
+
+    Args:
+        robot: limbs that share no joints.
+        targets: tips, and whether it is a pose (4, 4) that is wanted of each, or a position (3,).
+    """
+    recorder = Recorder(
+        identifier(robot.name, "pose"),
+        f"Joint positions of {robot.name} nearest to a guess that put base and tips where they are wanted,"
+        f" world frame; error: what lacks to each target [m and rad, norm]; {FOUND}; determinant of each"
+        " limb's screws.",
+    )
+    T, guess = pose_input(recorder, "T_world_base"), recorder.input("guess", len(robot.joints))
+    back, q = T.inverse, list(guess)
+    errors, founds, determinants = [], [], []
+    for tip, pose in targets:
+        chain = Chain.of(robot, tip)
+        name = identifier(tip)
+        if pose:
+            target = back @ pose_input(recorder, name)
+            branches = closed_form(chain).formula(target)
+        else:
+            wanted = T.R.T @ (Vector(*recorder.input(name, 3)) - T.p)
+            target, shoulder = Pose(UNTURNED, wanted), shoulder_of(chain)
+            assert shoulder is not None
+            branches = point_branches(chain.screws, shoulder, chain.tip.p, wanted)
+        own, found = nearest_branch(chain, branches, [guess[i] for i in chain.joints])
+        for i, x in zip(chain.joints, own, strict=True):
+            q[i] = x
+        errors.append(gap(chain, own, target, pose))
+        founds.append(found)
+        determinants.append(limb_determinant(robot, chain, own))
+    recorder.output("q", q)
+    recorder.output("error", errors)
+    recorder.output("found", founds)
+    recorder.output("determinant", determinants)
+    return recorder.program()
+
+
+def nearest_branch(
+    chain: Chain, branches: Sequence[Sequence[Scalar]], guess: Sequence[Scalar]
+) -> tuple[list[Scalar], Scalar]:
+    """Angles of the solution nearest to the guess, and whether it is one: 1, 0 (then the guess), -1 in doubt.
+
+    Nearness is the sum of (1 - cos) over the joints. It needs no angles: only one branch's are computed.
+    """
+    near = [(scalar.sin(x), scalar.cos(x)) for x in guess]
+    best: list[Scalar] = [-50.0, *(x for pair in near for x in pair)]
+    rival: Scalar = -50.0
+    for *q, slack in branches:
+        pairs = [(scalar.sin(x), scalar.cos(x)) for x in q]
+        alike = sum(s * t + c * d for (s, c), (t, d) in zip(pairs, near, strict=True))
+        here = [where(slack > DOUBT, alike, -100.0), *(x for pair in pairs for x in pair)]
+        rival = where((abs_(slack) <= DOUBT) & (alike > rival), alike, rival)
+        better = here[0] > best[0]
+        best = [where(better, new, old) for new, old in zip(here, best, strict=True)]
+    score, *flat = best
+    q = [scalar.arc(s, c) for s, c in zip(flat[::2], flat[1::2], strict=True)]
+    none = (score < -40.0) & (rival < -40.0)
+    return wrapped(chain, q), where(none, 0.0, where(rival + 1e-6 > score, -1.0, 1.0))
+
+
+def wrapped(chain: Chain, q: Sequence[Scalar]) -> list[Scalar]:
+    """Angles in (-pi, pi], or one turn off where only that is within the limits (``Chain.wrapped``)."""
+    turn, told = 2 * math.pi, []
+    for x, low, high in zip(q, chain.lower.tolist(), chain.upper.tolist(), strict=True):
+        x = scalar.arc(scalar.sin(x), scalar.cos(x))
+        if high > math.pi:
+            x = where((x < low) & (x + turn <= high), x + turn, x)
+        if low < -math.pi:
+            x = where((x > high) & (x - turn >= low), x - turn, x)
+        told.append(x)
+    return told
+
+
+def gap(chain: Chain, q: Sequence[Scalar], target: Pose, pose: bool = True) -> Scalar:
+    """What lacks to a pose [m and rad, norm] or to its position; small angles by their chord."""
+    D = AT_REST
+    for screw, x in zip(chain.screws, q, strict=True):
+        D = advance(D, screw, x)
+    miss = D @ chain.tip.p - target.p
+    if not pose:
+        return scalar.sqrt(dot(miss, miss))
+    R = D.R @ chain.tip.R
+    columns = zip((R.x, R.y, R.z), (target.R.x, target.R.y, target.R.z), strict=True)
+    chord = sum(dot(a - b, a - b) for a, b in columns) * 0.5
+    return scalar.sqrt(chord + dot(miss, miss))
+
+
+def limb_determinant(robot: Robot, chain: Chain, q: Sequence[Scalar]) -> Scalar:
+    """Determinant of a limb's screws, with velocities divided by its length (see ``solve.limb_rates``)."""
+    split = split_of(chain)
+    seen = seen_from(chain.screws, q, best_link(robot, chain.limb))
+    if len(chain.screws) == 3:
+        point = seen[-1] @ chain.tip.p
+    else:
+        point = seen[split.first] @ split.point if split else seen[0] @ chain.screws[0].s0
+    screws = [carry(d, screw) for d, screw in zip(seen, chain.screws, strict=False)]
+    twists = [Screw(s.s, s.s0 - point, s.pitch).twist for s in screws]
+    if len(twists) == 3:
+        return point_rates(twists, ZERO, chain.length)[1]
+    return pose_rates(twists, split, NO_TWIST, chain.length)[1]

@@ -1,0 +1,142 @@
+"""Programs compiled to machine code by the system's C compiler, where there is one, and kept on disk.
+
+Nothing here is required: without a compiler, or where it fails, ``compiled`` gives None and others compute.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+import platform
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from screwkin.kernel import emit_c
+from screwkin.kernel.program import Program
+
+Array = Any
+
+FLAGS = (
+    *("-std=c99", "-O3", "-march=native", "-mprefer-vector-width=512"),
+    *("-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math", "-shared", "-fPIC"),
+)
+"""Fused multiply-adds and no errno, but IEEE arithmetic otherwise: NaN and infinity keep their meaning."""
+THREADED_FROM = 8192
+"""Samples from which the batch is shared among the processor's cores."""
+
+
+def cache_folder() -> Path:
+    """Where compiled kernels are kept: ``$SCREWKIN_CACHE``, else the user's cache folder."""
+    import platformdirs
+
+    return Path(os.environ.get("SCREWKIN_CACHE") or platformdirs.user_cache_dir("screwkin", appauthor=False))
+
+
+@cache
+def compiler() -> str | None:
+    """Path of the C compiler: ``$SCREWKIN_CC`` (empty: none), else the first of cc, gcc and clang."""
+    wanted = os.environ.get("SCREWKIN_CC")
+    if wanted is not None:
+        return shutil.which(wanted) if wanted else None
+    return next(filter(None, map(shutil.which, ("cc", "gcc", "clang"))), None)
+
+
+@dataclass(frozen=True, eq=False)
+class Native:
+    """A compiled program. Its function takes a number of samples and one pointer for every array."""
+
+    program: Program
+    function: Any
+
+    def __call__(self, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
+        """Fill flat outputs (B, size) from flat inputs (B, size), all C-contiguous doubles."""
+        count, arrays = len(outputs[0]), [*inputs, *outputs]
+        cores = _cores() if count >= THREADED_FROM else 1
+        bounds = [count * k // cores for k in range(cores + 1)]
+        parts = [
+            (stop - start, *(a.ctypes.data + start * a.strides[0] for a in arrays))
+            for start, stop in pairwise(bounds)
+        ]
+        if cores == 1:
+            self.function(*parts[0])
+        else:  # ctypes lets go of the interpreter while C computes
+            list(_pool().map(lambda part: self.function(*part), parts))
+
+
+@cache
+def _cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@cache
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(_cores(), thread_name_prefix="screwkin")
+
+
+def is_kept(program: Program) -> bool:
+    """True if the compiled program is loaded or lies in the cache: using it costs no compilation."""
+    cc = compiler()
+    return cc is not None and _library(_source(program), cc).exists()
+
+
+def compiled(program: Program) -> Native | None:
+    """The program as machine code, from the cache or compiled now; None if that is not possible here."""
+    cc = compiler()
+    if cc is None:
+        return None
+    text = _source(program)
+    library = _library(text, cc)
+    try:
+        if not library.exists():
+            _build(text, cc, library)
+        function = ctypes.CDLL(str(library))[program.name]
+    except (OSError, subprocess.SubprocessError):
+        return None
+    function.restype = None
+    function.argtypes = [ctypes.c_size_t] + [ctypes.c_void_p] * (len(program.inputs) + len(program.outputs))
+    return Native(program, function)
+
+
+@cache
+def _source(program: Program) -> str:
+    """One file: the header's text in front of the definitions."""
+    header = emit_c.header([program], "SCREWKIN_KERNEL_H", "double")
+    return header + emit_c.source([program], None)
+
+
+@cache
+def _machine() -> str:
+    """What machine code depends on besides the source."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    flags = next((line for line in lines if line.startswith(("flags", "Features"))), "")
+    return f"{platform.machine()} {platform.processor()} {flags}"
+
+
+def _library(text: str, cc: str) -> Path:
+    made_by = os.stat(cc)
+    told = "\n".join([text, cc, str(made_by.st_size), str(made_by.st_mtime_ns), _machine(), *FLAGS])
+    return cache_folder() / f"{hashlib.sha256(told.encode()).hexdigest()[:32]}.so"
+
+
+def _build(text: str, cc: str, library: Path) -> None:
+    """Compile beside, then rename: two processes may do so at once."""
+    library.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    with tempfile.TemporaryDirectory(dir=library.parent) as folder:
+        source, made = Path(folder) / "kernel.c", Path(folder) / "kernel.so"
+        source.write_text(text, encoding="utf-8")
+        subprocess.run(
+            [cc, *FLAGS, "-o", str(made), str(source), "-lm"], check=True, capture_output=True, timeout=300
+        )
+        made.replace(library)

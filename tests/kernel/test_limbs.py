@@ -1,0 +1,103 @@
+"""Closed forms as programs against the readable closed forms, hard cases included."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import screwkin as sk
+from screwkin.kernel import limbs
+from screwkin.kernel.run import run
+from screwkin.solve.chain import Chain
+from screwkin.solve.ik import closed_positions
+from screwkin.solve.pose import solve_pose
+
+LEGS = (("bioloid", "left_leg"), ("bioloid", "right_leg"), ("poppy12", "left_leg"), ("poppy12", "right_leg"))
+
+
+def within_limits(robot, count, seed=0):
+    rng = np.random.default_rng(seed)
+    low, high = (np.array([getattr(j, k) for j in robot.joints]) for k in ("lower", "upper"))
+    return rng.uniform(low, high, (count, len(low)))
+
+
+@pytest.mark.parametrize(("name", "limb"), LEGS)
+def test_a_large_batch_has_the_branches_flags_and_order_of_small_ones(name, limb):
+    robot = sk.load_robot(name)
+    T = sk.frame_pose(robot, sk.State(np.eye(4), within_limits(robot, 1200)), robot.limb(limb).tip)
+    T[:40, 0, 3] += 2.0  # out of reach
+    large = sk.limb_ik(robot, limb, T, least_squares=False)
+    parts = [sk.limb_ik(robot, limb, T[i : i + 600], least_squares=False) for i in (0, 600)]
+    for field in ("valid", "in_limits"):
+        np.testing.assert_array_equal(
+            getattr(large, field), np.concatenate([getattr(p, field) for p in parts])
+        )
+    np.testing.assert_allclose(large.best[40:], np.concatenate([p.best for p in parts])[40:], atol=1e-7)
+    assert large.residual[40:, 0].max() <= 1e-12
+    assert (large.status[:40] == sk.solve.status.Status.UNREACHABLE).all()
+
+
+@pytest.mark.parametrize(("name", "limb"), LEGS)
+def test_the_nearest_solution_is_the_one_that_was_moved_a_little(name, limb):
+    robot = sk.load_robot(name)
+    q = within_limits(robot, 3000, 1)
+    T = sk.frame_pose(robot, sk.State(np.eye(4), q), robot.limb(limb).tip)
+    chain = Chain.of(robot, limb)
+    own = q[:, list(chain.joints)]
+    guess = own + 0.05 * np.random.default_rng(2).uniform(-1, 1, own.shape)
+    found = run(limbs.limb_nearest(robot, limb), {"T_base_tip": T, "guess": guess}, path="numpy")
+    sure = found["found"][:, 0] == 1
+    assert sure.mean() > 0.99
+    readable, solved = closed_positions(chain, T, guess)
+    assert solved.all()
+    np.testing.assert_allclose(found["q"][sure], readable[sure], atol=1e-7)
+    assert np.quantile(found["error"][sure], 0.99) < 1e-12
+
+
+def test_out_of_reach_and_at_the_border_are_told_apart():
+    robot = sk.load_robot("bioloid")
+    straight = np.zeros((2, 18))
+    T = sk.frame_pose(robot, sk.State(np.eye(4), straight), "left_foot")
+    T[1, 2, 3] -= 0.01
+    found = run(limbs.limb_nearest(robot, "left_leg"), {"T_base_tip": T, "guess": np.full((2, 6), 0.1)})
+    assert found["found"][:, 0].tolist() == [-1, 0]
+    np.testing.assert_allclose(found["q"][1], 0.1)
+
+
+@pytest.mark.parametrize(("name", "gait"), [("bioloid", "walk"), ("poppy12", "poppy12-preview")])
+def test_whole_bodies_are_posed_by_closed_forms_as_by_newton(name, gait):
+    robot = sk.load_robot(name)
+    walked = sk.walk(robot, sk.load_gait(gait).replace(rate=300), steps=3)
+    count = len(walked.time)
+    assert count > 1000, "else the test compares Newton with itself"
+    targets = {"base": walked.T_world_base}
+    for limb in robot.limbs:
+        T = walked.T_world_tip[limb.tip]
+        targets[limb.tip] = T if limb.kind == "leg" else T[:, :3, 3]
+    guess = sk.State(walked.T_world_base, np.array(robot.posture("home").q))
+    fast, slow = sk.solve_pose(robot, targets, guess), solve_pose(robot, targets, guess)
+    assert fast.ok
+    np.testing.assert_allclose(fast.state.q, slow.state.q, atol=1e-9)
+    assert fast.residual.max() < 1e-12
+    assert fast.iterations.max() == 1, "no sample was left to Newton"
+
+
+def test_unreachable_singular_and_forbidden_samples_have_the_same_status_in_a_large_batch():
+    robot = sk.load_robot("bioloid")
+    home = sk.home(robot)
+    q = np.tile(home.q, (1200, 1))
+    q[3, :] = 0.0  # straight knees
+    q[5, robot.joint_names.index("left_hip_roll")] = -np.pi / 2 - 1e-3
+    states = sk.State(np.tile(home.T_world_base, (1200, 1, 1)), q)
+    targets = {tip: sk.frame_pose(robot, states, tip) for tip in ("left_foot", "right_foot")}
+    targets["left_foot"][7, 0, 3] += 0.3
+    large = sk.solve_pose(robot, targets, sk.State(states.T_world_base, q))
+    small = solve_pose(
+        robot, {k: v[:10] for k, v in targets.items()}, sk.State(states.T_world_base[:10], q[:10])
+    )
+    np.testing.assert_array_equal(large.status[:10], small.status)
+    assert large.status[[3, 7], 0].tolist() == [
+        sk.solve.status.Status.SINGULAR,
+        sk.solve.status.Status.UNREACHABLE,
+    ]
+    np.testing.assert_allclose(large.distance[7, 0], small.distance[7, 0], rtol=1e-6)
