@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from screwkin.errors import ShapeError
+from screwkin.kernel.run import FROM
 from screwkin.model.robot import Robot
 from screwkin.model.state import State, not_rigid
 from screwkin.scalar import is_jax
@@ -65,6 +66,11 @@ def parts(robot: Robot, state: State) -> tuple[Pose, list[Any], tuple[int, ...]]
             f"batch of state.T_world_base {T.shape[:-2]} and of state.q {q.shape[:-1]} do not broadcast"
         ) from None
     return pose_from_array(rigid("state.T_world_base", T)), unstack(q), batch
+
+
+def compiles(state: State, batch: tuple[int, ...]) -> bool:
+    """True where a program computes rather than the formula itself: a large batch of NumPy arrays."""
+    return not (is_jax(state.T_world_base) or is_jax(state.q)) and int(np.prod(batch)) >= FROM
 
 
 def joint_scalars(robot: Robot, name: str, values: Any) -> list[Any]:

@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from screwkin.api.arrays import Array, checked, joint_scalars, parts, twist_of
+from screwkin.api.arrays import Array, checked, compiles, joint_scalars, parts, twist_of
 from screwkin.dynamics import newton_euler
 from screwkin.errors import InputError
+from screwkin.kernel import body
+from screwkin.kernel.run import run
 from screwkin.kinematics import mass, positions
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
@@ -44,6 +46,8 @@ def link_poses(robot: Robot, state: State) -> Array:
     Source: paper A, eq. 2-3.
     """
     T, q, batch = parts(robot, state)
+    if compiles(state, batch):
+        return run(body.link_poses(robot), vars(state))["T_world_link"]
     D = positions.link_displacements(robot, q)
     return as_array([T @ (d @ link.frame) for d, link in zip(D, robot.links, strict=True)], batch)
 
@@ -55,6 +59,9 @@ def frame_pose(robot: Robot, state: State, frame: str) -> Array:
         UnknownNameError: no such frame; the message lists all frames.
     """
     T, q, batch = parts(robot, state)
+    if frame in robot.tip_names and compiles(state, batch):
+        tips = run(body.tip_poses(robot), vars(state))["T_world_tip"]
+        return np.ascontiguousarray(tips[..., robot.tip_names.index(frame), :, :])
     return as_array(T @ positions.frame_pose(robot, positions.link_displacements(robot, q), frame), batch)
 
 
@@ -95,6 +102,8 @@ def center_of_mass(robot: Robot, state: State) -> Array:
     """
     _check_mass(robot)
     T, q, batch = parts(robot, state)
+    if compiles(state, batch):
+        return run(body.mass_center(robot), vars(state))["com"]
     return as_array(T @ mass.center_of_mass(robot, positions.link_displacements(robot, q)), batch)
 
 

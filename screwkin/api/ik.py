@@ -8,6 +8,9 @@ import numpy as np
 
 from screwkin.api.arrays import Array, checked
 from screwkin.errors import InputError, ShapeError
+from screwkin.kernel.branches import limb_solutions
+from screwkin.kernel.limbs import solvable
+from screwkin.kernel.run import FROM
 from screwkin.model.robot import Robot
 from screwkin.solve.branches import LimbSolutions
 from screwkin.solve.chain import Chain
@@ -73,6 +76,8 @@ def limb_ik(
     shape = target.shape[target.ndim - around :]
     flat = np.broadcast_to(target, (*batch, *shape)).reshape(count, *shape)
     flat_start = np.broadcast_to(start, (*batch, start.shape[-1])).reshape(count, -1)
+    if count >= FROM and poses and (method == "closed" or (method == "auto" and solvable(robot, limb, True))):
+        return limb_solutions(robot, chain.limb, flat, flat_start, batch, least_squares)
     return solve_limb(chain, flat, method, flat_start, settings or IkSettings(), batch, least_squares)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from screwkin.api.arrays import Array, checked, parts, rigid, twist_of
 from screwkin.api.body import home
 from screwkin.errors import InputError, SingularError, UnknownNameError
+from screwkin.kernel.pose import solve_pose_fast
 from screwkin.mechanism import network
 from screwkin.mechanism import virtual_motion as virtual
 from screwkin.mechanism.mechanism import Mechanism
@@ -17,9 +18,9 @@ from screwkin.model.robot import Robot
 from screwkin.model.state import State
 from screwkin.scalar import is_jax
 from screwkin.se3 import ZERO, Twist, as_array, vector_from_array
-from screwkin.solve import pose as pose_solver
 from screwkin.solve import rates
 from screwkin.solve.pose import PoseSolution
+from screwkin.solve.pose import solve_pose as newton_pose
 from screwkin.solve.singularity import singularity_report
 from screwkin.solve.status import Status
 
@@ -141,7 +142,8 @@ def solve_pose(
         targets: ``"base"`` (..., 4, 4) and tips by name: a pose (..., 4, 4), or a position (..., 3) with the
             orientation free; world frame.
         guess: a nearby state; default ``home``. Its base pose holds where ``"base"`` is not given.
-        method: ``"newton"``, through the network matrix; ``"auto"`` chooses.
+        method: ``"newton"``, through the network matrix; ``"auto"``: for large batches the closed forms of
+            the limbs, where they have some, of the solution nearest to the guess.
 
     Returns:
         PoseSolution with ``.state .status .residual .iterations`` (..., limbs). Nothing is raised for samples
@@ -162,4 +164,5 @@ def solve_pose(
         wanted[name] = rigid(told, checked(told, value, 4, 4)) if pose else checked(told, value, 3)
     guess = home(robot) if guess is None else guess
     parts(robot, guess)
-    return pose_solver.solve_pose(robot, wanted, State(np.asarray(guess.T_world_base), np.asarray(guess.q)))
+    start = State(np.asarray(guess.T_world_base, dtype=float), np.asarray(guess.q, dtype=float))
+    return (solve_pose_fast if method == "auto" else newton_pose)(robot, wanted, start)

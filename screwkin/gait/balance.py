@@ -12,6 +12,8 @@ from screwkin.dynamics.newton_euler import GRAVITY, Bodies, ground_wrench
 from screwkin.dynamics.support import Spike, spikes, support_margin
 from screwkin.dynamics.zmp import cart_table_zmp, zmp_from_wrench
 from screwkin.errors import InputError
+from screwkin.kernel.body import balance as compiled_balance
+from screwkin.kernel.run import FROM, run
 from screwkin.kinematics.mass import center_of_mass
 from screwkin.model.robot import Robot
 from screwkin.screw import wrench_at
@@ -87,6 +89,10 @@ def ground_reaction(
         twist: [omega; v of the base origin] (T, 6), world axes.
         acceleration: its time derivative (T, 6).
     """
+    if len(q) >= FROM:
+        told = {"T_world_base": T_world_base, "q": q, "qd": qd, "qdd": qdd}
+        found = run(compiled_balance(robot), told | {"base_twist": twist, "base_acceleration": acceleration})
+        return found["zmp"], found["com"], found["wrench"], found["cart_table"]
     T, scalars, batch = pose_from_array(T_world_base), unstack(q), (len(q),)
     bodies = Bodies.of(robot, T.R, scalars)
     wrench = ground_wrench(

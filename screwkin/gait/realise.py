@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,15 +12,20 @@ from screwkin.errors import InputError, SingularError
 from screwkin.gait.balance import sole_corners
 from screwkin.gait.plan import Plan
 from screwkin.gait.stance import LEFT, RIGHT, Foot, Hand, Stance
+from screwkin.kernel.body import follows, motion
+from screwkin.kernel.pose import solve_pose_fast
+from screwkin.kernel.records import identifier
+from screwkin.kernel.run import FROM, run
 from screwkin.kinematics.positions import frame_pose, link_displacements
+from screwkin.mechanism.choice import RANK_TOLERANCE
 from screwkin.mechanism.mechanism import Mechanism
 from screwkin.mechanism.network import blend, coupling_twists, network_matrix
 from screwkin.mechanism.virtual_motion import primary_motion
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 from screwkin.se3 import Twist, as_array, pose_from_array, twist_from_array, unstack, vector_from_array
-from screwkin.solve.pose import PoseSolution, solve_pose
-from screwkin.solve.rates import SecondarySolution, secondary_accelerations, secondary_rates
+from screwkin.solve.pose import PoseSolution
+from screwkin.solve.rates import block_names, secondary_accelerations, secondary_rates, singular_values
 from screwkin.solve.status import Status
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -71,7 +77,7 @@ def positions(robot: Robot, mechanism: Mechanism, made: Plan, guess: Array | Non
     """
     start = np.array(robot.posture("home").q) if guess is None else guess
     targets = {"base": made.T_world_base, **_targets(robot, mechanism, made)}
-    solution = solve_pose(robot, targets, State(made.T_world_base, start))
+    solution = solve_pose_fast(robot, targets, State(made.T_world_base, start))
     solution.raise_on_failure(robot, made.time)
     return solution
 
@@ -102,12 +108,17 @@ def differentiate(mechanism: Mechanism, made: Plan, state: State) -> Motion:
     q, T = unstack(state.q), pose_from_array(made.T_world_base)
     twists = coupling_twists(mechanism, T.R, q)
     N = network_matrix(mechanism, twists, (len(made.time),))
+    if len(made.time) >= FROM and follows(robot := mechanism.robot, mechanism.secondary):
+        sigma = singular_values(mechanism, N)
+        _refuse_singular(block_names(mechanism), sigma, made)
+        qd, qdd = _compiled_motion(robot, made, state.q)
+        return Motion(state.q, qd, qdd, sigma, block_names(mechanism))
     first, second = _imposed(made, 0), _imposed(made, 1)
     order, batch = mechanism.primary, (len(made.time),)
     rates = primary_motion(mechanism, T, q, first)
     primary = as_array([rates[name] for name in order], batch)
     secondary = secondary_rates(mechanism, N, primary)
-    _refuse_singular(secondary, made)
+    _refuse_singular(secondary.blocks, secondary.sigma, made)
     everything = blend(mechanism.primary_columns, primary, mechanism.secondary_columns, secondary.values)
     accelerations = primary_motion(mechanism, T, q, first, second)
     driven = as_array([accelerations[name] for name in order], batch)
@@ -126,12 +137,27 @@ def _imposed(made: Plan, order: int) -> dict[str, Twist]:
     return moved | {name: Twist(base.omega, vector_from_array(value)) for name, value in hands.items()}
 
 
-def _refuse_singular(secondary: SecondarySolution, made: Plan) -> None:
-    if secondary.singular.any():
-        sample, block = (int(i) for i in np.argwhere(secondary.singular)[0])
+def _compiled_motion(robot: Robot, made: Plan, q: Array) -> tuple[Array, Array]:
+    """The same rates and accelerations by the compiled reciprocal screws of each limb."""
+    count, inputs = (len(made.time),), {"T_world_base": made.T_world_base, "q": q}
+    inputs |= {"base_twist": made.base_twist, "base_acceleration": made.base_acceleration}
+    for order, suffix in ((0, ""), (1, "_acceleration")):
+        imposed = _imposed(made, order)
+        for limb in robot.limbs:
+            told = as_array(imposed[limb.tip], count)
+            whole = len(robot.path_to(limb.link)) == 6
+            inputs[identifier(limb.tip + suffix)] = told if whole else told[:, 3:]
+    found = run(motion(robot, accelerations=True), inputs)
+    return found["qd"], found["qdd"]
+
+
+def _refuse_singular(blocks: Sequence[str], sigma: Array, made: Plan) -> None:
+    singular = sigma < RANK_TOLERANCE
+    if singular.any():
+        sample, block = (int(i) for i in np.argwhere(singular)[0])
         raise SingularError(
-            f"{secondary.blocks[block]}, sample {sample} (t = {made.time[sample]:.3f} s): singular; "
+            f"{blocks[block]}, sample {sample} (t = {made.time[sample]:.3f} s): singular; "
             f"{Status.SINGULAR.help}",
-            secondary.blocks[block],
+            blocks[block],
             sample,
         )
