@@ -9,7 +9,7 @@ Source: paper B, table 7; docs/papers.md tells what is read into it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -17,7 +17,7 @@ import numpy as np
 
 from screwkin.dynamics.springs import StiffnessChoice
 from screwkin.errors import InputError
-from screwkin.gait.compensation import Method, Model, compensate
+from screwkin.gait.compensation import WAYS, compensate, way_of
 from screwkin.model.robot import Robot
 from screwkin.sim.compliant import STEP, Compliance, CompliantBackend
 from screwkin.sim.measure import zmp_record
@@ -27,12 +27,7 @@ from screwkin.trajectory import Trajectory
 
 Treatment = Literal["none", "swing", "joint", "dynamic"]
 TREATMENTS: tuple[Treatment, ...] = ("none", "swing", "joint", "dynamic")
-CHOICES: Mapping[Treatment, tuple[Method, Model]] = {
-    "swing": ("swing", "linear"),
-    "joint": ("joint", "linear"),
-    "dynamic": ("joint", "dynamic"),
-}
-"""Method and model of ``compensate`` behind each treatment; ``none`` plays the plan itself."""
+"""``none`` plays the plan itself, the others what ``compensate`` makes of it in one of its ``WAYS``."""
 
 Pair = tuple[float, float]
 
@@ -116,22 +111,39 @@ def compliance_study(
     if unknown or not treatments:
         found = f"unknown treatment {unknown[0]!r}" if unknown else "no treatment"
         raise InputError(f"{found}; valid: {', '.join(TREATMENTS)}")
+    trials: list[Trial] = []
+    for done, treatment in enumerate(treatments):
+        told = trajectory
+        if treatment != "none":
+            method, model = WAYS[treatment]
+            told = compensate(robot, trajectory, stiffness, method, passes, model)
+
+        def so_far(share: float, done: int = done) -> None:
+            if progress is not None:
+                progress((done + share) / len(treatments))
+
+        trials += repeated(robot, told, stiffness, conditions, so_far)
+    return summarised(trials)
+
+
+def repeated(
+    robot: Robot,
+    trajectory: Trajectory,
+    stiffness: StiffnessChoice = None,
+    conditions: Conditions | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> list[Trial]:
+    """One trial of a trajectory, compensated or not, per friction and time step; see ``compliance_study``."""
     given = conditions or Conditions()
     cases = [(friction, dt) for friction in given.frictions for dt in given.steps]
     if not cases:
         raise InputError("no conditions; give at least one friction and one time step")
-    trials: list[Trial] = []
-    total = len(treatments) * len(cases)
-    for treatment in treatments:
-        told = trajectory
-        if treatment != "none":
-            method, model = CHOICES[treatment]
-            told = compensate(robot, trajectory, stiffness, method, passes, model)
-        for friction, dt in cases:
-            trials.append(_trial(robot, told, stiffness, treatment, friction, dt, given))
-            if progress is not None:
-                progress(len(trials) / total)
-    return summarised(trials)
+    trials = []
+    for friction, dt in cases:
+        trials.append(_trial(robot, trajectory, stiffness, way_of(trajectory), friction, dt, given))
+        if progress is not None:
+            progress(len(trials) / len(cases))
+    return trials
 
 
 def summarised(trials: Sequence[Trial]) -> tuple[StudyRow, ...]:

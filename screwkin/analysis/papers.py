@@ -1,9 +1,9 @@
 """What a paper tells, as data: tables and figures, its numbers, and the measures that answer them.
 
 A file in ``papers/`` holds ``[paper]`` (name, title, source, robot, and ``changes`` to its gaits, if any) and
-``[[section]]`` (place, title, text) with rows and pictures. A row has ``item``, ``measure``, and as far as there
-are any ``with`` (the measure's arguments), ``paper`` (the printed value), ``note``, ``unit``, ``form`` (how ours is
-written) and ``within`` (how far apart equal values may be).
+``[[section]]`` (place, title, text) with rows and pictures. A row has ``item``, ``measure``, and as far as
+there are any ``with`` (the measure's arguments), ``paper`` (the printed value), ``note``, ``unit``, ``form``
+(how ours is written) and ``within`` (how far apart equal values may be).
 """
 
 from __future__ import annotations

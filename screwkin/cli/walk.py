@@ -9,9 +9,11 @@ from typing import Annotated
 
 import typer
 
+from screwkin.cli.compensated import make_compensated, remedy
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, RobotName, settings
 from screwkin.cli.output import aligned, print_json, progress_bar, remark
+from screwkin.gait.compensation import WAYS
 from screwkin.gait.files import default_gait, load_gait
 from screwkin.gait.record import Gait
 from screwkin.gait.walk import walk as walk_of
@@ -37,16 +39,32 @@ def walk(
         str | None,
         typer.Option(metavar="true|waist", help="What a preview gait steers: the CoM or the waist."),
     ] = None,
+    compensate: Annotated[
+        str | None,
+        typer.Option(
+            metavar="|".join(WAYS),
+            help="Also commands for elastic servos: corrected by the foot in the air, or by all joints.",
+        ),
+    ] = None,
+    passes: Annotated[int | None, typer.Option(help="Of the compensation; default: 1.")] = None,
+    k: Annotated[
+        float | None,
+        typer.Option(
+            "-k", "--stiffness", help="Of the servos to compensate for [N m/rad]; default: the table's."
+        ),
+    ] = None,
     plots: Annotated[bool, typer.Option(help="Draw the pictures and write the report.")] = True,
     output: OutputFolder = None,
     as_json: AsJson = False,
 ) -> int:
     """Make the trajectory of a gait: trajectory.npz, trajectory.csv, plots and report.html.
 
+    With --compensate also compensated/trajectory.npz, the commands for servos that yield, beside the plan.
     Exit code 3 if a limb cannot reach, is singular or beyond a limit; the message names limb and time. A ZMP
     outside the support polygon is told, but the trajectory is still made.
     """
     table = load_robot(robot)
+    wanted = remedy(table, compensate, passes, k)
     assignments = [*(assignments or []), *([] if com is None else [f"com={com}"])]
     name = gait or default_gait(table.name)
     chosen = chosen_gait(name, assignments, rate)
@@ -54,12 +72,19 @@ def walk(
     command = command_of(robot, name, steps, assignments, rate)
     with output_folder(output, "walk", table.name) as folder:
         account = make_trajectory(table, chosen, steps, command, folder)
+        told = None
+        if wanted is not None:
+            command = shlex.join([*shlex.split(command), *wanted.words])
+            told = make_compensated(table, account.trajectory, wanted, command, folder)
         if plots:
             write_report(account, folder)
     if as_json:
-        print_json({**walk_data(account), "gait": chosen.name, "folder": str(folder)})
+        extra = {} if told is None else {"compensation": told.to_dict()}
+        print_json({**walk_data(account), "gait": chosen.name, "folder": str(folder), **extra})
     else:
         _print_summary(account, chosen, folder)
+        if told is not None:
+            print(told.text())
     return 0
 
 

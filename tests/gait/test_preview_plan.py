@@ -86,7 +86,7 @@ def test_the_naive_plan_leaves_the_soles_in_single_support_where_the_true_com_ke
 
 
 def test_the_face_of_the_foot_that_bears_decides_whether_the_naive_plan_keeps_inside(gait: sk.Gait) -> None:
-    """The whole outline of table 3, 63 mm wide, would hold its ZMP; 13 mm less do not. Nothing else changes."""
+    """The whole outline of table 3, 63 mm wide, would hold its ZMP; 50 mm do not. Nothing else changes."""
     table = find_robot("poppy12").read_text(encoding="utf-8")
     whole = parse_robot(table.replace('sole_edge = "6.5*mm"', "sole_edge = 0.0"))
     naive = sk.walk(whole, gait.replace(com="waist"))
