@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
 from screwkin.analysis.compare import Comparison, compare_models
+from screwkin.analysis.engines import Yielding
 from screwkin.analysis.validate import Validation, validate
 from screwkin.gait.files import load_gait
 from screwkin.gait.record import Gait
@@ -66,10 +67,11 @@ class Bench:
         changed = {**self._changes, **(changes or {})}
         return load_gait(name).replace(**changed) if changed else load_gait(name)
 
-    def validation(self, account: Account) -> Validation:
-        """The verdict of the simulator on a walk."""
-        trajectory = account.trajectory
-        return self.once(("validation", trajectory.sha256), lambda: validate(account.robot, trajectory))
+    def validation(self, account: Account, sole_stiffness: float | None = None) -> Validation:
+        """The verdict of the simulator on a walk, with rigid soles or elastic ones [N/m]."""
+        trajectory, gives = account.trajectory, Yielding(sole_stiffness=sole_stiffness)
+        key = ("validation", trajectory.sha256, sole_stiffness)
+        return self.once(key, lambda: validate(account.robot, trajectory, gives=gives))
 
     def comparison(self, robot: str = "") -> Comparison:
         """Screws against DH tables."""

@@ -10,8 +10,8 @@ Source: paper B, table 7; docs/papers.md tells what is read into it.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, Literal
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from screwkin.errors import InputError
 from screwkin.gait.compensation import WAYS, compensate, way_of
 from screwkin.model.robot import Robot
 from screwkin.sim.compliant import STEP, Compliance, CompliantBackend
-from screwkin.sim.measure import zmp_record
+from screwkin.sim.measure import ZmpRecord, zmp_record
 from screwkin.sim.pybullet import Physics
 from screwkin.sim.run import Schedule, simulate
 from screwkin.trajectory import Trajectory
@@ -51,13 +51,17 @@ class Conditions:
 
 @dataclass(frozen=True)
 class Trial:
-    """One run: time of its fall [s] or None; largest |x| and |y| error of the ZMP [mm], up to a fall."""
+    """One run: time of its fall [s] or None; largest |x| and |y| error of the ZMP [mm], up to a fall.
+
+    zmp: its ZMP beside the planned one.
+    """
 
     treatment: Treatment
     friction: float
     dt: float
     fell_at: float | None
     zmp_max_mm: Pair
+    zmp: ZmpRecord | None = field(default=None, repr=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -75,6 +79,14 @@ class StudyRow:
     range_mm: tuple[Pair, Pair] | None
     cut: Pair | None
     trials: tuple[Trial, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """All but the ZMPs over time, as JSON data."""
+        bare = replace(self, trials=tuple(replace(trial, zmp=None) for trial in self.trials))
+        told = asdict(bare)
+        for trial in told["trials"]:
+            del trial["zmp"]
+        return told
 
 
 def compliance_study(
@@ -184,7 +196,7 @@ def _trial(
     error = 1e3 * np.abs(zmp.contact - zmp.planned)
     error = error[np.isfinite(error).all(axis=1)]
     x, y = error.max(axis=0).tolist() if len(error) else (np.nan, np.nan)
-    return Trial(treatment, friction, dt, run.fallen_at, (x, y))
+    return Trial(treatment, friction, dt, run.fallen_at, (x, y), zmp)
 
 
 def _stood(

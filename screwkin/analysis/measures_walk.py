@@ -102,13 +102,24 @@ def spike_phases(
 
 
 def simulated(
-    bench: Bench, key: str, gait: str, steps: int | None = None, changes: Changes = None, robot: str = ""
+    bench: Bench,
+    key: str,
+    gait: str,
+    steps: int | None = None,
+    changes: Changes = None,
+    sole_stiffness: float | None = None,
+    robot: str = "",
 ) -> float | str:
-    """What the simulator says of a walk; lengths as the verdict tells them, truth as yes or no."""
+    """What the simulator says of a walk; lengths as the verdict tells them, truth as yes or no.
+
+    Soles are rigid unless ``sole_stiffness`` [N/m] of every point of contact is given.
+    """
     account = bench.account(gait, steps, robot, changes)
-    found = bench.validation(account).to_dict()
-    if key not in found or isinstance(found[key], dict | list | None):
+    found = bench.validation(account, sole_stiffness).to_dict()
+    if key not in found or isinstance(found[key], dict | list):
         raise InputError(f"a verdict has no single value {key}; it has {', '.join(found)}")
+    if found[key] is None:
+        return "no"
     value: float | str = found[key]
     return ("yes" if value else "no") if isinstance(value, bool) else value
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -83,7 +83,7 @@ class Validation:
         """All but the series, as JSON data for ``validation.json``."""
         values = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in _SERIES}
         told = {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
-        return told | {"repeated": None if self.repeated is None else asdict(self.repeated)}
+        return told | {"repeated": None if self.repeated is None else self.repeated.to_dict()}
 
 
 def validate(

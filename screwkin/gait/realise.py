@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from screwkin.errors import InputError, SingularError
+from screwkin.errors import InputError
 from screwkin.gait.balance import sole_corners
 from screwkin.gait.plan import Plan
 from screwkin.gait.stance import LEFT, RIGHT, Foot, Hand, Stance
@@ -19,8 +19,8 @@ from screwkin.model.robot import Robot
 from screwkin.model.state import State
 from screwkin.se3 import Twist, as_array, pose_from_array, twist_from_array, unstack, vector_from_array
 from screwkin.solve.pose import PoseSolution, solve_pose
-from screwkin.solve.rates import SecondarySolution, secondary_accelerations, secondary_rates
-from screwkin.solve.status import Status
+from screwkin.solve.rates import secondary_accelerations, secondary_rates
+from screwkin.solve.singularity import refuse_singular
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -107,7 +107,7 @@ def differentiate(mechanism: Mechanism, made: Plan, state: State) -> Motion:
     rates = primary_motion(mechanism, T, q, first)
     primary = as_array([rates[name] for name in order], batch)
     secondary = secondary_rates(mechanism, N, primary)
-    _refuse_singular(secondary, made)
+    refuse_singular(mechanism, N, secondary, made.time)
     everything = blend(mechanism.primary_columns, primary, mechanism.secondary_columns, secondary.values)
     accelerations = primary_motion(mechanism, T, q, first, second)
     driven = as_array([accelerations[name] for name in order], batch)
@@ -124,14 +124,3 @@ def _imposed(made: Plan, order: int) -> dict[str, Twist]:
     hands = (made.hand_velocity, made.hand_acceleration)[order]
     moved = {"waist": base, **{name: twist_from_array(value) for name, value in tips.items()}}
     return moved | {name: Twist(base.omega, vector_from_array(value)) for name, value in hands.items()}
-
-
-def _refuse_singular(secondary: SecondarySolution, made: Plan) -> None:
-    if secondary.singular.any():
-        sample, block = (int(i) for i in np.argwhere(secondary.singular)[0])
-        raise SingularError(
-            f"{secondary.blocks[block]}, sample {sample} (t = {made.time[sample]:.3f} s): singular; "
-            f"{Status.SINGULAR.help}",
-            secondary.blocks[block],
-            sample,
-        )
