@@ -72,6 +72,12 @@ class Compensated:
             "convergence": [asdict(row) for row in self.rows],
         }
 
+    def save(self) -> None:
+        """Write the commands as ``.npz`` and ``.csv``."""
+        make_folder(self.path.parent)
+        for ending in (".npz", ".csv"):
+            self.trajectory.save(self.path.with_suffix(ending))
+
     def text(self) -> str:
         """The table of its passes."""
         head = f"commands compensated by {self.remedy.way} in {self.path}"
@@ -89,17 +95,18 @@ class Compensated:
         return f"{head}\n  static error of the foot in the air after each pass:\n{aligned(lines, '  ')}"
 
 
-def make_compensated(
+def compensated(
     robot: Robot, trajectory: Trajectory, wanted: Remedy, command: str, folder: Path
 ) -> Compensated:
-    """Make the commands and write them as ``.npz`` and ``.csv`` into a folder of their own."""
+    """The commands, to be written into a folder of their own in ``folder``.
+
+    Raises:
+        NoSolutionError, LimitError: such servos cannot be compensated. Others as of ``compensate``.
+    """
     method, model = WAYS[wanted.way]
     told = compensate(robot, trajectory, wanted.stiffness, method, wanted.passes, model)
     told = replace(told, meta={**told.meta, "command": command})
     rows: Sequence[Remaining] = ()
     if model != "dynamic":
         rows = convergence(robot, trajectory, wanted.stiffness, wanted.passes, method, model)
-    place = make_folder(folder / FOLDER)
-    for ending in ("npz", "csv"):
-        told.save(place / f"trajectory.{ending}")
-    return Compensated(wanted, told, place / "trajectory.npz", rows)
+    return Compensated(wanted, told, folder / FOLDER / "trajectory.npz", rows)

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from screwkin.cli.compensated import make_compensated, remedy
+from screwkin.cli.compensated import compensated, remedy
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, RobotName, settings
 from screwkin.cli.output import aligned, print_json, progress_bar, remark
@@ -71,11 +71,13 @@ def walk(
     steps = chosen.steps if steps is None else steps
     command = command_of(robot, name, steps, assignments, rate)
     with output_folder(output, "walk", table.name) as folder:
-        account = make_trajectory(table, chosen, steps, command, folder)
-        told = None
+        account, told = _planned(table, chosen, steps, command), None
         if wanted is not None:
             command = shlex.join([*shlex.split(command), *wanted.words])
-            told = make_compensated(table, account.trajectory, wanted, command, folder)
+            told = compensated(table, account.trajectory, wanted, command, folder)
+        _save(account, folder)
+        if told is not None:
+            told.save()
         if plots:
             write_report(account, folder)
     if as_json:
@@ -107,13 +109,21 @@ def command_of(robot: str, gait: str, steps: int, assignments: Sequence[str], ra
 
 def make_trajectory(robot: Robot, gait: Gait, steps: int, command: str, folder: Path) -> Account:
     """Make a trajectory and write it as ``.npz`` and ``.csv``."""
+    account = _planned(robot, gait, steps, command)
+    _save(account, folder)
+    return account
+
+
+def _planned(robot: Robot, gait: Gait, steps: int, command: str) -> Account:
     with progress_bar("walk") as done:
         trajectory = walk_of(robot, gait, steps, command)
         done(0.5)
-        account = account_of(robot, trajectory)
-    trajectory.save(folder / "trajectory.npz")
-    trajectory.save(folder / "trajectory.csv")
-    return account
+        return account_of(robot, trajectory)
+
+
+def _save(account: Account, folder: Path) -> None:
+    for ending in ("npz", "csv"):
+        account.trajectory.save(folder / f"trajectory.{ending}")
 
 
 def write_report(account: Account, folder: Path) -> Path:
