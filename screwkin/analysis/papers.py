@@ -104,6 +104,8 @@ def parse_paper(text: str, path: str = "<text>") -> Paper:
         raise InputError(f"{path}: no valid TOML: {error}") from None
     faults: list[Fault] = []
     head = _checked(Paper, data.get("paper"), "[paper]", faults, ("sections",))
+    if not isinstance(head.get("changes", {}), dict):
+        faults.append(Fault("[paper]", "changes", "no table", "Write { parameter = value } of the gaits"))
     sections = []
     for number, told in enumerate(_tables(data, "section", faults), 1):
         where = f"section {number}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -15,9 +16,17 @@ from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.mechanism.mechanism import Mechanism
 from screwkin.mechanism.network import blend, coupling_twists, network_matrix
 from screwkin.mechanism.virtual_motion import primary_motion
-from screwkin.model.robot import Robot
+from screwkin.model.robot import Limb, Robot
 from screwkin.model.state import State
-from screwkin.se3 import Twist, as_array, pose_from_array, twist_from_array, unstack, vector_from_array
+from screwkin.se3 import (
+    Twist,
+    Vector,
+    as_array,
+    pose_from_array,
+    twist_from_array,
+    unstack,
+    vector_from_array,
+)
 from screwkin.solve.pose import PoseSolution, solve_pose
 from screwkin.solve.rates import secondary_accelerations, secondary_rates
 from screwkin.solve.singularity import refuse_singular
@@ -42,7 +51,7 @@ def stance_of(robot: Robot) -> Stance:
         side = LEFT if p.y > 0 else RIGHT
         if limb.kind == "leg":
             outline = tuple((float(x), float(y)) for x, y, _ in sole_corners(robot, limb.tip))
-            feet.append(Foot(limb.tip, side, outline))
+            feet.append(Foot(limb.tip, side, outline, _body(robot, limb)))
             places.append(abs(float(p.y)))
         else:
             root = robot.joints[robot.path_to(limb.link)[0]].screw.s0
@@ -50,6 +59,16 @@ def stance_of(robot: Robot) -> Stance:
     if sorted(foot.side for foot in feet) != [RIGHT, LEFT]:
         raise InputError(f"robot {robot.name} has {len(feet)} legs; a walk needs one on either side")
     return Stance(sum(places) / len(places), tuple(feet), tuple(hands))
+
+
+def _body(robot: Robot, limb: Limb) -> tuple[tuple[float, float], ...]:
+    """Corners (x, y) of the boxes of a limb's last link, in the frame of its tip [m]."""
+    corners = [
+        limb.frame.inverse @ (box.center + Vector(a * box.size.x, b * box.size.y, c * box.size.z) * 0.5)
+        for box in robot.link(limb.link).boxes
+        for a, b, c in product((-1, 1), repeat=3)
+    ]
+    return tuple((float(corner.x), float(corner.y)) for corner in corners)
 
 
 @dataclass(frozen=True, eq=False)

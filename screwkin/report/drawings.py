@@ -225,7 +225,7 @@ def sprung_zmp_above(
     soles = soles_on_floor(account.robot, trajectory.feet, trajectory.T_world_tip)
     wanted = zmp_lines(bench, gait, None, robot)[0]
     figure, axes = new_figure(
-        0.7 + 2.3 * len(treatments), len(treatments), sharex=True, sharey=True, squeeze=False
+        0.8 + 1.55 * len(treatments), len(treatments), sharex=True, sharey=True, squeeze=False
     )
     for one, treatment, style in zip(axes[:, 0], treatments, _TREATED, strict=False):
         balance.draw_soles(one, account, soles)
@@ -241,7 +241,7 @@ def sprung_zmp_above(
 
 _TREATED = (
     {"color": MEASURED, "linewidth": 1.0},
-    {"color": SIDES[1], "linewidth": 1.0},
+    {"color": SIDES[3], "linewidth": 1.0},
     {"color": SIDES[2], "linewidth": 1.0, "linestyle": "--"},
 )
 """Lines of a figure's treatments, in their order."""

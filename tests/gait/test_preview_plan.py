@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import screwkin as sk
-from screwkin.errors import GaitError, InputError
+from screwkin.errors import GaitError, InputError, NoSolutionError
 from screwkin.gait.footsteps import footholds
 from screwkin.gait.plan import plan
 from screwkin.gait.preview import follow_reference, preview_gains
@@ -94,6 +94,12 @@ def test_the_face_of_the_foot_that_bears_decides_whether_the_naive_plan_keeps_in
     narrower = sk.zmp(sk.load_robot("poppy12"), naive).margin.min()
     assert 0.003 < least < 0.006
     assert narrower == pytest.approx(least - 0.0065, abs=1e-9)
+
+
+def test_feet_may_not_overlap_even_where_their_soles_do_not(robot: sk.Robot, gait: sk.Gait) -> None:
+    """Feet of 63 mm touch 31.5 mm from the middle; what bears is 50 mm wide."""
+    with pytest.raises(NoSolutionError, match=r"left_foot and right_foot overlap .* by up to 1\.0 mm"):
+        sk.walk(robot, gait.replace(spread=0.031 - 0.048))
 
 
 def test_another_robot_with_arms_walks_by_preview_too() -> None:
