@@ -257,11 +257,11 @@ def _run_of(bench: Bench, gait: str, treatment: str, stiffness: float, robot: st
 def _treated(trial: Trial) -> str:
     told = {
         "none": "without compensation",
-        "swing": "with that of the swing foot",
-        "joint": "by joint commands",
+        "swing": "swing foot compensated",
+        "joint": "joints compensated",
     }
     fell = "" if trial.fell_at is None else f", falls at {trial.fell_at:.1f} s"
-    return told.get(trial.treatment, "by the walk's torques") + fell
+    return told.get(trial.treatment, "joints led by the walk's torques") + fell
 
 
 _ALL: tuple[Drawing, ...] = (
