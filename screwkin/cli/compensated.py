@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+import typer
 
 from screwkin.cli.output import aligned
 from screwkin.dynamics.springs import joint_stiffness
@@ -14,6 +16,22 @@ from screwkin.files import make_folder
 from screwkin.gait.compensation import WAYS, Remaining, Way, compensate, convergence
 from screwkin.model.robot import Robot
 from screwkin.trajectory import Trajectory
+
+CompensateBy = Annotated[
+    str | None,
+    typer.Option(
+        metavar="|".join(WAYS),
+        help="Also commands for elastic servos: correct the foot in the air, or all joints by statics or by "
+        "the torques of the walk.",
+    ),
+]
+Passes = Annotated[int | None, typer.Option(help="Of the compensation; default: 1.")]
+ServoStiffness = Annotated[
+    float | None,
+    typer.Option(
+        "-k", "--stiffness", help="Of the servos to compensate for [N m/rad]; default: the table's."
+    ),
+]
 
 FOLDER = "compensated"
 """The folder of the commands, beside the plan: both are trajectories with a verdict of their own."""

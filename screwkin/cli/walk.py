@@ -9,11 +9,10 @@ from typing import Annotated
 
 import typer
 
-from screwkin.cli.compensated import compensated, remedy
+from screwkin.cli.compensated import CompensateBy, Passes, ServoStiffness, compensated, remedy
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, RobotName, settings
 from screwkin.cli.output import aligned, print_json, progress_bar, remark
-from screwkin.gait.compensation import WAYS
 from screwkin.gait.files import default_gait, load_gait
 from screwkin.gait.record import Gait
 from screwkin.gait.walk import walk as walk_of
@@ -39,20 +38,9 @@ def walk(
         str | None,
         typer.Option(metavar="true|waist", help="What a preview gait steers: the CoM or the waist."),
     ] = None,
-    compensate: Annotated[
-        str | None,
-        typer.Option(
-            metavar="|".join(WAYS),
-            help="Also commands for elastic servos: corrected by the foot in the air, or by all joints.",
-        ),
-    ] = None,
-    passes: Annotated[int | None, typer.Option(help="Of the compensation; default: 1.")] = None,
-    k: Annotated[
-        float | None,
-        typer.Option(
-            "-k", "--stiffness", help="Of the servos to compensate for [N m/rad]; default: the table's."
-        ),
-    ] = None,
+    compensate: CompensateBy = None,
+    passes: Passes = None,
+    k: ServoStiffness = None,
     plots: Annotated[bool, typer.Option(help="Draw the pictures and write the report.")] = True,
     output: OutputFolder = None,
     as_json: AsJson = False,
