@@ -6,8 +6,10 @@ from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
 from screwkin.analysis.compare import Comparison, compare_models
+from screwkin.analysis.engines import Yielding
 from screwkin.analysis.validate import Validation, validate
 from screwkin.gait.files import load_gait
+from screwkin.gait.record import Gait
 from screwkin.gait.walk import walk
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
@@ -17,11 +19,18 @@ from screwkin.report.facts import Facts, facts_of
 Made = TypeVar("Made")
 
 
-class Bench:
-    """What measures share. ``robot`` is the paper's, meant wherever a measure names none."""
+Changes = Mapping[str, str | float]
 
-    def __init__(self, robot: str) -> None:
+
+class Bench:
+    """What measures share.
+
+    ``robot`` is the paper's, meant wherever a measure names none; ``changes`` are made to every gait first.
+    """
+
+    def __init__(self, robot: str, changes: Changes | None = None) -> None:
         self._default = robot
+        self._changes = dict(changes or {})
         self._made: dict[tuple[object, ...], Any] = {}
 
     def once(self, key: tuple[object, ...], make: Callable[[], Made]) -> Made:
@@ -46,22 +55,23 @@ class Bench:
         gait: str,
         steps: int | None = None,
         robot: str = "",
-        changes: Mapping[str, str | float] | None = None,
+        changes: Changes | None = None,
     ) -> Account:
         """A walk and its balance."""
-        table, changed = self.robot(robot), dict(changes or {})
-        key = ("account", table.name, gait, steps, *sorted(changed.items()))
+        table = self.robot(robot)
+        key = ("account", table.name, gait, steps, *sorted((changes or {}).items()))
+        return self.once(key, lambda: account_of(table, walk(table, self.gait(gait, changes), steps)))
 
-        def made() -> Account:
-            chosen = load_gait(gait).replace(**changed) if changed else load_gait(gait)
-            return account_of(table, walk(table, chosen, steps))
+    def gait(self, name: str, changes: Changes | None = None) -> Gait:
+        """A gait as the paper walks it, with further changes."""
+        changed = {**self._changes, **(changes or {})}
+        return load_gait(name).replace(**changed) if changed else load_gait(name)
 
-        return self.once(key, made)
-
-    def validation(self, account: Account) -> Validation:
-        """The verdict of the simulator on a walk."""
-        trajectory = account.trajectory
-        return self.once(("validation", trajectory.sha256), lambda: validate(account.robot, trajectory))
+    def validation(self, account: Account, sole_stiffness: float | None = None) -> Validation:
+        """The verdict of the simulator on a walk, with rigid soles or elastic ones [N/m]."""
+        trajectory, gives = account.trajectory, Yielding(sole_stiffness=sole_stiffness)
+        key = ("validation", trajectory.sha256, sole_stiffness)
+        return self.once(key, lambda: validate(account.robot, trajectory, gives=gives))
 
     def comparison(self, robot: str = "") -> Comparison:
         """Screws against DH tables."""

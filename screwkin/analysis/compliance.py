@@ -9,30 +9,25 @@ Source: paper B, table 7; docs/papers.md tells what is read into it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Literal
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, Literal
 
 import numpy as np
 
 from screwkin.dynamics.springs import StiffnessChoice
 from screwkin.errors import InputError
-from screwkin.gait.compensation import Method, Model, compensate
+from screwkin.gait.compensation import WAYS, compensate, way_of
 from screwkin.model.robot import Robot
 from screwkin.sim.compliant import STEP, Compliance, CompliantBackend
-from screwkin.sim.measure import zmp_record
+from screwkin.sim.measure import ZmpRecord, zmp_record
 from screwkin.sim.pybullet import Physics
 from screwkin.sim.run import Schedule, simulate
 from screwkin.trajectory import Trajectory
 
 Treatment = Literal["none", "swing", "joint", "dynamic"]
 TREATMENTS: tuple[Treatment, ...] = ("none", "swing", "joint", "dynamic")
-CHOICES: Mapping[Treatment, tuple[Method, Model]] = {
-    "swing": ("swing", "linear"),
-    "joint": ("joint", "linear"),
-    "dynamic": ("joint", "dynamic"),
-}
-"""Method and model of ``compensate`` behind each treatment; ``none`` plays the plan itself."""
+"""``none`` plays the plan itself, the others what ``compensate`` makes of it in one of its ``WAYS``."""
 
 Pair = tuple[float, float]
 
@@ -56,13 +51,17 @@ class Conditions:
 
 @dataclass(frozen=True)
 class Trial:
-    """One run: time of its fall [s] or None; largest |x| and |y| error of the ZMP [mm], up to a fall."""
+    """One run: time of its fall [s] or None; largest |x| and |y| error of the ZMP [mm], up to a fall.
+
+    zmp: its ZMP beside the planned one.
+    """
 
     treatment: Treatment
     friction: float
     dt: float
     fell_at: float | None
     zmp_max_mm: Pair
+    zmp: ZmpRecord | None = field(default=None, repr=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -80,6 +79,14 @@ class StudyRow:
     range_mm: tuple[Pair, Pair] | None
     cut: Pair | None
     trials: tuple[Trial, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """All but the ZMPs over time, as JSON data."""
+        bare = replace(self, trials=tuple(replace(trial, zmp=None) for trial in self.trials))
+        told = asdict(bare)
+        for trial in told["trials"]:
+            del trial["zmp"]
+        return told
 
 
 def compliance_study(
@@ -116,22 +123,39 @@ def compliance_study(
     if unknown or not treatments:
         found = f"unknown treatment {unknown[0]!r}" if unknown else "no treatment"
         raise InputError(f"{found}; valid: {', '.join(TREATMENTS)}")
+    trials: list[Trial] = []
+    for done, treatment in enumerate(treatments):
+        told = trajectory
+        if treatment != "none":
+            method, model = WAYS[treatment]
+            told = compensate(robot, trajectory, stiffness, method, passes, model)
+
+        def so_far(share: float, done: int = done) -> None:
+            if progress is not None:
+                progress((done + share) / len(treatments))
+
+        trials += repeated(robot, told, stiffness, conditions, so_far)
+    return summarised(trials)
+
+
+def repeated(
+    robot: Robot,
+    trajectory: Trajectory,
+    stiffness: StiffnessChoice = None,
+    conditions: Conditions | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> list[Trial]:
+    """One trial of a trajectory, compensated or not, per friction and time step; see ``compliance_study``."""
     given = conditions or Conditions()
     cases = [(friction, dt) for friction in given.frictions for dt in given.steps]
     if not cases:
         raise InputError("no conditions; give at least one friction and one time step")
-    trials: list[Trial] = []
-    total = len(treatments) * len(cases)
-    for treatment in treatments:
-        told = trajectory
-        if treatment != "none":
-            method, model = CHOICES[treatment]
-            told = compensate(robot, trajectory, stiffness, method, passes, model)
-        for friction, dt in cases:
-            trials.append(_trial(robot, told, stiffness, treatment, friction, dt, given))
-            if progress is not None:
-                progress(len(trials) / total)
-    return summarised(trials)
+    trials = []
+    for friction, dt in cases:
+        trials.append(_trial(robot, trajectory, stiffness, way_of(trajectory), friction, dt, given))
+        if progress is not None:
+            progress(len(trials) / len(cases))
+    return trials
 
 
 def summarised(trials: Sequence[Trial]) -> tuple[StudyRow, ...]:
@@ -172,7 +196,7 @@ def _trial(
     error = 1e3 * np.abs(zmp.contact - zmp.planned)
     error = error[np.isfinite(error).all(axis=1)]
     x, y = error.max(axis=0).tolist() if len(error) else (np.nan, np.nan)
-    return Trial(treatment, friction, dt, run.fallen_at, (x, y))
+    return Trial(treatment, friction, dt, run.fallen_at, (x, y), zmp)
 
 
 def _stood(

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from screwkin.analysis import measures_leg, measures_springs, measures_table, measures_walk
+from screwkin.errors import InputError, UnknownNameError
 
 Measure = Callable[..., Any]
 """A number, a vector or a text."""
@@ -47,12 +48,21 @@ MEASURES: Mapping[str, Measure] = {measure.__name__: measure for measure in _ALL
 """Measures take a ``Bench`` and named arguments, and give a value in SI units."""
 
 
-def argument_faults(function: Callable[..., object], told: Mapping[str, object]) -> str:
-    """What is wrong with the arguments of a measure or drawing; empty if nothing is."""
-    parameters = list(inspect.signature(function).parameters.values())[1:]
+def check_call(
+    kind: str, name: str, known: Mapping[str, Callable[..., Any]], told: Mapping[str, object], where: str
+) -> None:
+    """Raise unless ``name`` is a known measure or drawing, and takes the arguments told beside the bench.
+
+    Raises:
+        UnknownNameError, InputError: what is wrong; ``where`` says in which row.
+    """
+    if name not in known:
+        raise UnknownNameError(f"{kind} of {where!r}", name, list(known))
+    parameters = list(inspect.signature(known[name]).parameters.values())[1:]
     names = [parameter.name for parameter in parameters]
-    unknown = [name for name in told if name not in names]
+    unknown = [one for one in told if one not in names]
     missing = [p.name for p in parameters if p.default is p.empty and p.name not in told]
     parts = [f"unknown arguments {', '.join(unknown)}"] if unknown else []
     parts += [f"missing arguments {', '.join(missing)}"] if missing else []
-    return f"{' and '.join(parts)}; valid: {', '.join(names)}" if parts else ""
+    if parts:
+        raise InputError(f"{where}: {kind} {name} has {' and '.join(parts)}; valid: {', '.join(names)}")

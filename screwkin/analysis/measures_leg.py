@@ -163,10 +163,8 @@ def zmp_lines(
     com_height: float | None = None,
 ) -> tuple[Array, Array, Array]:
     """ZMP (T, 2) [m] of a preview gait: wanted, of the cart that follows it, and of all links."""
-    from screwkin.gait.files import load_gait
-
     account = bench.account(gait, steps, robot)
-    plan, stance = load_gait(gait), stance_of(account.robot)
+    plan, stance = bench.gait(gait), stance_of(account.robot)
     count = plan.steps if steps is None else steps
     time = account.trajectory.time
     wanted = zmp_reference(plan, stance, footholds(plan, stance, count), count, time)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from screwkin.analysis.bench import Bench
-from screwkin.analysis.compliance import TREATMENTS, Conditions, StudyRow, compliance_study
+from screwkin.analysis.compliance import TREATMENTS, Conditions, StudyRow, Trial, compliance_study
 from screwkin.errors import UnknownNameError
 
+FRICTIONS = (0.8, 1.0)
 KEYS = ("x", "y", "cut x", "cut y", "fallen", "runs", "range x", "range y")
 
 
@@ -28,13 +29,26 @@ def row_of(
     return next(row for row in rows if row.treatment == chosen)
 
 
+def trial_of(
+    bench: Bench,
+    gait: str,
+    treatment: str,
+    stiffness: float,
+    frictions: Sequence[float] = FRICTIONS,
+    robot: str = "",
+) -> Trial:
+    """The run at the largest friction, with its ZMP over time."""
+    trials = row_of(bench, gait, treatment, stiffness, frictions, robot).trials
+    return max(trials, key=lambda trial: trial.friction)
+
+
 def on_springs(
     bench: Bench,
     gait: str,
     treatment: str,
     key: str,
     stiffness: float,
-    frictions: Sequence[float] = (0.8, 1.0),
+    frictions: Sequence[float] = FRICTIONS,
     robot: str = "",
 ) -> float | str | list[float]:
     """Median over the runs of the largest ZMP error ``x`` or ``y`` [m], or how many fell.

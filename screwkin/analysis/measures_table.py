@@ -84,9 +84,10 @@ def sole(bench: Bench, limb: str, robot: str = "") -> Array:
     raise UnknownNameError("sole", limb, [one.limb for one in bench.robot(robot).soles])
 
 
-def size(bench: Bench, along: str = "xyz", robot: str = "") -> Array:
-    """Length, width and height (3,) [m] of a robot's boxes in the zero pose, or those named by letters."""
-    boxes = [box for link in bench.robot(robot).links for box in link.boxes]
+def size(bench: Bench, along: str = "xyz", link: str = "", robot: str = "") -> Array:
+    """Length, width and height (3,) [m] of the boxes of a link or of all, or those named by letters."""
+    table = bench.robot(robot)
+    boxes = [box for one in ([table.link(link)] if link else table.links) for box in one.boxes]
     ends = [_vector(box.center) + sign * _vector(box.size) / 2 for box in boxes for sign in (-1, 1)]
     return np.asarray(np.ptp(ends, axis=0)[["xyz".index(letter) for letter in along]])
 

@@ -102,11 +102,22 @@ def spike_phases(
 
 
 def simulated(
-    bench: Bench, key: str, gait: str, steps: int | None = None, changes: Changes = None, robot: str = ""
+    bench: Bench,
+    key: str,
+    gait: str,
+    steps: int | None = None,
+    changes: Changes = None,
+    sole_stiffness: float | None = None,
+    robot: str = "",
 ) -> float | str:
-    """What the simulator says of a walk; lengths as the verdict tells them, truth as yes or no."""
+    """What the simulator says of a walk; lengths as the verdict tells them, truth as yes or no.
+
+    Soles are rigid unless ``sole_stiffness`` [N/m] of every point of contact is given.
+    """
     account = bench.account(gait, steps, robot, changes)
-    found = bench.validation(account).to_dict()
+    found = bench.validation(account, sole_stiffness).to_dict()
+    if key == "fell_at" and found[key] is None:
+        return "does not fall"
     if key not in found or isinstance(found[key], dict | list | None):
         raise InputError(f"a verdict has no single value {key}; it has {', '.join(found)}")
     value: float | str = found[key]

@@ -1,9 +1,9 @@
 """What a paper tells, as data: tables and figures, its numbers, and the measures that answer them.
 
-A file in ``papers/`` holds ``[paper]`` (name, title, source, robot, and what else its measures take by
-default) and ``[[section]]`` (place, title, text) with rows and pictures. A row has ``item``, ``measure``, and
-as far as there are any ``with`` (the measure's arguments), ``paper`` (the printed value), ``note``, ``unit``,
-``form`` (how ours is written) and ``within`` (how far apart equal values may be).
+A file in ``papers/`` holds ``[paper]`` (name, title, source, robot, and ``changes`` to its gaits, if any) and
+``[[section]]`` (place, title, text) with rows and pictures. A row has ``item``, ``measure``, and as far as
+there are any ``with`` (the measure's arguments), ``paper`` (the printed value), ``note``, ``unit``, ``form``
+(how ours is written) and ``within`` (how far apart equal values may be).
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Paper:
-    """A paper, as far as it can be measured."""
+    """A paper, as far as it can be measured; its walks are those of gait files with some ``changes``."""
 
     name: str
     title: str
@@ -78,6 +78,7 @@ class Paper:
     robot: str
     sections: tuple[Section, ...]
     text: str = ""
+    changes: Mapping[str, str | float] = field(default_factory=dict)
 
 
 def load_paper(name_or_path: str | Path) -> Paper:
@@ -103,6 +104,8 @@ def parse_paper(text: str, path: str = "<text>") -> Paper:
         raise InputError(f"{path}: no valid TOML: {error}") from None
     faults: list[Fault] = []
     head = _checked(Paper, data.get("paper"), "[paper]", faults, ("sections",))
+    if not isinstance(head.get("changes", {}), dict):
+        faults.append(Fault("[paper]", "changes", "no table", "Write { parameter = value } of the gaits"))
     sections = []
     for number, told in enumerate(_tables(data, "section", faults), 1):
         where = f"section {number}"

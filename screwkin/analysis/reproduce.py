@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from screwkin.analysis.bench import Bench
-from screwkin.analysis.measures import MEASURES, argument_faults
+from screwkin.analysis.measures import MEASURES, check_call
 from screwkin.analysis.papers import UNITS, Paper, Row, Section, Value
-from screwkin.errors import InputError, MissingDependencyError, UnknownNameError
+from screwkin.errors import MissingDependencyError
 
 MARKS = {True: "same", False: "differs", None: ""}
 """How a row's agreement is told."""
@@ -91,11 +91,7 @@ def check_paper(paper: Paper) -> None:
     """
     for section in paper.sections:
         for row in section.rows:
-            if row.measure not in MEASURES:
-                raise UnknownNameError(f"measure of {_item(section, row)!r}", row.measure, list(MEASURES))
-            wrong = argument_faults(MEASURES[row.measure], row.with_)
-            if wrong:
-                raise InputError(f"{_item(section, row)}: measure {row.measure} has {wrong}")
+            check_call("measure", row.measure, MEASURES, row.with_, _item(section, row))
 
 
 def reproduce(paper: Paper, bench: Bench, progress: Progress = lambda share: None) -> Reproduction:

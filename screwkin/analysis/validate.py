@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
-from screwkin.errors import InputError, UnknownNameError
+from screwkin.analysis.compliance import Conditions, StudyRow, Trial, repeated, summarised
+from screwkin.analysis.engines import Engine, Yielding, opened
+from screwkin.errors import InputError
 from screwkin.gait.balance import zmp as balance_of
+from screwkin.gait.compensation import way_of
+from screwkin.gait.intended import intended
 from screwkin.model.robot import Robot
-from screwkin.sim.backend import Array, Backend
+from screwkin.sim.backend import Array
 from screwkin.sim.camera import Camera, Picture
-from screwkin.sim.kinematic import KinematicBackend
+from screwkin.sim.compliant import CompliantBackend
 from screwkin.sim.measure import WINDOW, Slip, ZmpRecord, slip, speed_use, torque_use, zmp_record
 from screwkin.sim.render import pictures
 from screwkin.sim.run import Run, Schedule, simulate
 from screwkin.trajectory import Trajectory
 
-Engine = Literal["pybullet", "kinematic"]
-ENGINES: tuple[Engine, ...] = ("pybullet", "kinematic")
 _SERIES = ("run", "zmp", "pictures")
 
 
@@ -41,6 +43,8 @@ class Validation:
 
     zmp_rms_mm and zmp_max_mm: contact ZMP against the planned one, the larger of x and y; the ``_xy`` fields
     tell both, and ankle_rms_xy_mm the ankle sensors against the contacts; None where nothing was measured.
+    compensation: how the commands allow for elastic servos, or ``none``; joint_stiffness [N m/rad] and
+    sole_stiffness [N/m]: what yields in the simulation, None if rigid; repeated: runs under other conditions.
     """
 
     passed: bool
@@ -67,6 +71,10 @@ class Validation:
     torque_use: dict[str, float]
     speed_use: dict[str, float]
     trajectory_sha256: str
+    compensation: str
+    joint_stiffness: dict[str, float] | None
+    sole_stiffness: float | None
+    repeated: StudyRow | None
     run: Run
     zmp: ZmpRecord
     pictures: tuple[Picture, ...] = ()
@@ -74,7 +82,8 @@ class Validation:
     def to_dict(self) -> dict[str, Any]:
         """All but the series, as JSON data for ``validation.json``."""
         values = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in _SERIES}
-        return {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
+        told = {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
+        return told | {"repeated": None if self.repeated is None else self.repeated.to_dict()}
 
 
 def validate(
@@ -85,6 +94,7 @@ def validate(
     gui: bool = False,
     camera: Camera | None = None,
     criteria: Criteria | None = None,
+    gives: Yielding | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Validation:
     """Play the trajectory in a simulator and judge what happened.
@@ -96,23 +106,40 @@ def validate(
         gui: show a window, in real time.
         camera: take its pictures of what happens; they need neither display nor simulator.
         criteria: what a walk must keep to.
+        gives: what yields; by default nothing does. In repeated runs the robot may not fall either.
         progress: called now and then with the share done.
 
     Raises:
-        InputError: unknown engine, or a trajectory of another robot.
+        InputError: unknown engine, a trajectory of another robot, or nothing that can yield so.
         MissingDependencyError: the engine is not installed.
     """
-    if engine not in ENGINES:
-        raise UnknownNameError("engine", engine, ENGINES)
     _check_fit(robot, trajectory)
-    rule = criteria or Criteria()
-    backend = _opened(robot, engine, gui)
+    rule, told = criteria or Criteria(), progress or (lambda share: None)
+    gives = (gives or Yielding()).for_trajectory(robot, trajectory)
+    first = 0.2 if gives.repeat else 1.0
+    backend = opened(robot, engine, gives, gui)
     try:
-        run = simulate(robot, trajectory, backend, rule.schedule, progress)
+        run = simulate(robot, trajectory, backend, rule.schedule, lambda share: told(first * share))
     finally:
         backend.close()
     taken = film(robot, trajectory, run, camera) if camera else ()
-    return replace(judged(robot, trajectory, run, rule), pictures=taken)
+    check = replace(judged(robot, trajectory, run, rule, gives), pictures=taken)
+    if not gives.repeat or gives.servos is None:
+        return check
+    conditions = Conditions(sole_stiffness=gives.sole_stiffness)
+
+    def later(share: float) -> None:
+        told(first + (1.0 - first) * share)
+
+    return _repeated(check, repeated(robot, trajectory, gives.servos.stiffness, conditions, later))
+
+
+def _repeated(check: Validation, trials: Sequence[Trial]) -> Validation:
+    """The verdict with repeated runs, none of which may fall."""
+    (row,) = summarised(trials)
+    fell = f"falls in {row.fallen} of {row.runs} repetitions under other frictions and time steps"
+    reasons = (*check.reasons, *([fell] if row.fallen else []))
+    return replace(check, repeated=row, reasons=reasons, passed=not reasons)
 
 
 def film(robot: Robot, trajectory: Trajectory, run: Run, camera: Camera) -> tuple[Picture, ...]:
@@ -120,14 +147,6 @@ def film(robot: Robot, trajectory: Trajectory, run: Run, camera: Camera) -> tupl
     times = np.linspace(trajectory.time[0], trajectory.time[-1], camera.pictures)
     rows = np.searchsorted(run.time, times[times <= run.time[-1] + 1e-9] - 1e-9)
     return tuple(pictures(robot, run.time[rows], run.T_world_base[rows], run.q[rows], camera))
-
-
-def _opened(robot: Robot, engine: Engine, gui: bool) -> Backend:
-    if engine == "kinematic":
-        return KinematicBackend(robot)
-    from screwkin.sim.pybullet import PyBulletBackend
-
-    return PyBulletBackend(robot, gui=gui)
 
 
 def _check_fit(robot: Robot, trajectory: Trajectory) -> None:
@@ -142,8 +161,12 @@ def _check_fit(robot: Robot, trajectory: Trajectory) -> None:
         raise InputError(f"the trajectory tells no contact of {', '.join(missing)} of robot {robot.name}")
 
 
-def judged(robot: Robot, trajectory: Trajectory, run: Run, criteria: Criteria) -> Validation:
-    """The verdict on a finished run."""
+def judged(
+    robot: Robot, trajectory: Trajectory, run: Run, criteria: Criteria, gives: Yielding | None = None
+) -> Validation:
+    """The verdict on a finished run, in which something gave way or nothing did."""
+    gives = (gives or Yielding()).for_trajectory(robot, trajectory)
+    springs = gives.servos.stiffness if gives.servos is not None else None
     legs = tuple(limb.tip for limb in robot.limbs if limb.kind == "leg")
     zmp, slipped = zmp_record(run, trajectory), slip(run, trajectory, legs)
     rms, largest = _deviation(zmp.contact - zmp.planned)
@@ -154,7 +177,7 @@ def judged(robot: Robot, trajectory: Trajectory, run: Run, criteria: Criteria) -
     facts = Validation(
         passed=False,
         reasons=(),
-        warnings=_warnings(robot, run, slipped, speed),
+        warnings=_warnings(robot, trajectory, run, slipped, speed),
         engine=run.engine,
         fell=run.fallen_at is not None,
         fell_at=run.fallen_at,
@@ -176,6 +199,10 @@ def judged(robot: Robot, trajectory: Trajectory, run: Run, criteria: Criteria) -
         torque_use=dict(zip(robot.joint_names, torque.tolist(), strict=True)),
         speed_use=dict(zip(robot.joint_names, speed.tolist(), strict=True)),
         trajectory_sha256=trajectory.sha256,
+        compensation=way_of(trajectory),
+        joint_stiffness=dict(springs) if isinstance(springs, Mapping) else None,
+        sole_stiffness=gives.sole_stiffness,
+        repeated=None,
         run=run,
         zmp=zmp,
     )
@@ -185,7 +212,8 @@ def judged(robot: Robot, trajectory: Trajectory, run: Run, criteria: Criteria) -
 
 def _least_margin(robot: Robot, trajectory: Trajectory) -> float:
     """The smallest margin [m], recorded or computed anew: a verdict does not rest on what a file says."""
-    return float(min(trajectory.margin.min(), balance_of(robot, trajectory).margin.min()))
+    anew = balance_of(robot, intended(robot, trajectory))
+    return float(min(trajectory.margin.min(), anew.margin.min()))
 
 
 def _reasons(facts: Validation, rule: Criteria) -> tuple[str, ...]:
@@ -211,9 +239,11 @@ def _reasons(facts: Validation, rule: Criteria) -> tuple[str, ...]:
     return tuple(reasons)
 
 
-def _warnings(robot: Robot, run: Run, slipped: Slip, speed: Array) -> tuple[str, ...]:
+def _warnings(robot: Robot, trajectory: Trajectory, run: Run, slipped: Slip, speed: Array) -> tuple[str, ...]:
     """What does not fail a walk but should be known."""
     warnings = []
+    if way_of(trajectory) != "none" and run.engine != CompliantBackend.name:
+        warnings.append("commands that allow for elastic servos, simulated on rigid ones")
     fast = [
         f"{joint.name} {use * joint.velocity:.1f} of {joint.velocity:.1f} rad/s"
         for joint, use in zip(robot.joints, speed, strict=True)

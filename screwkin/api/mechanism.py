@@ -9,7 +9,7 @@ import numpy as np
 
 from screwkin.api.arrays import Array, checked, parts, rigid, twist_of
 from screwkin.api.body import home
-from screwkin.errors import InputError, SingularError, UnknownNameError
+from screwkin.errors import InputError, UnknownNameError
 from screwkin.kernel.pose import solve_pose_fast
 from screwkin.mechanism import network
 from screwkin.mechanism import virtual_motion as virtual
@@ -21,7 +21,7 @@ from screwkin.se3 import ZERO, Twist, as_array, vector_from_array
 from screwkin.solve import rates
 from screwkin.solve.pose import PoseSolution
 from screwkin.solve.pose import solve_pose as newton_pose
-from screwkin.solve.singularity import singularity_report
+from screwkin.solve.singularity import refuse_singular
 from screwkin.solve.status import Status
 
 
@@ -109,13 +109,7 @@ def secondary_rates(
         return solution.values, _status(singular.any(axis=-1), solution.values.shape[:-1])
     if on_singular != "raise":
         raise InputError(f"on_singular is {on_singular!r}; valid: raise, status")
-    if singular.any():
-        flat = np.reshape(singular, (-1, singular.shape[-1]))
-        sample, block = (int(i) for i in np.argwhere(flat)[0])
-        here = np.reshape(np.asarray(N), (-1, *N.shape[-2:]))[sample]
-        limb, cause = solution.blocks[block], singularity_report(mechanism, here)[block].cause
-        message = f"{limb}, sample {sample}: singular; {cause}; {Status.SINGULAR.help}"
-        raise SingularError(message, limb, sample)
+    refuse_singular(mechanism, N, solution)
     return solution.values
 
 

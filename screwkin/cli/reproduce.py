@@ -37,7 +37,11 @@ def reproduce(
     """
     paper = load_paper(name)
     check_paper(paper)
-    bench = Bench(paper.robot)
+    if plots:
+        from screwkin.report.reproduction import check_pictures
+
+        check_pictures(paper)
+    bench = Bench(paper.robot, paper.changes)
     with output_folder(output, "reproduce", paper.name) as folder:
         with progress_bar("measuring") as done:
             found = measured(paper, bench, done)

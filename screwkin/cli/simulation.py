@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
-from screwkin.analysis.validate import ENGINES, Engine, Validation
+from screwkin.analysis.engines import ENGINES, Engine, Yielding
+from screwkin.analysis.validate import Validation
 from screwkin.analysis.validate import validate as validated
 from screwkin.cli.output import plain, progress_bar
 from screwkin.errors import UnknownNameError
@@ -25,13 +26,17 @@ FEWEST, MOST = 30, 120
 
 @dataclass(frozen=True)
 class Wish:
-    """What a simulation is to be: engine, a window, a film, pictures and page; commands for the page."""
+    """What a simulation is to be: engine, a window, a film, pictures and page; commands for the page.
+
+    gives: what yields; see ``validate``.
+    """
 
     engine: str = "pybullet"
     gui: bool = False
     video: bool = False
     plots: bool = True
     commands: Sequence[str] = ()
+    gives: Yielding = field(default_factory=Yielding)
 
 
 def simulate(account: Account, folder: Path, verdict: Path, wish: Wish) -> Validation:
@@ -51,7 +56,13 @@ def simulate(account: Account, folder: Path, verdict: Path, wish: Wish) -> Valid
     camera = _camera(trajectory.duration) if wish.video else None
     with progress_bar("simulation") as done:
         check = validated(
-            account.robot, trajectory, engine(wish.engine), gui=wish.gui, camera=camera, progress=done
+            account.robot,
+            trajectory,
+            engine(wish.engine),
+            gui=wish.gui,
+            camera=camera,
+            gives=wish.gives,
+            progress=done,
         )
     with atomic_write(verdict) as file:
         file.write(json.dumps(plain(check.to_dict()), indent=2, allow_nan=False) + "\n")

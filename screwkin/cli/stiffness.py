@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Annotated, Any
 
 import numpy as np
@@ -11,13 +11,11 @@ import typer
 
 from screwkin.analysis.map_arrays import deflection_arrays
 from screwkin.analysis.stiffness_maps import DeflectionMap, stiffness_maps
-from screwkin.cli.folder import output_folder
+from screwkin.cli.maps import Heights, LimbName, MapResult, Pictures, Resolution, made_maps, reached_maps
 from screwkin.cli.options import AsJson, OutputFolder, RobotName
-from screwkin.cli.output import aligned, print_json, progress_bar
-from screwkin.cli.workspace import Heights, LimbName, Pictures, Resolution, reached_maps
+from screwkin.cli.output import progress_bar
 from screwkin.dynamics.springs import joint_stiffness
 from screwkin.dynamics.stiffness import Method
-from screwkin.files import atomic_write_bytes, npz_bytes
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
 
@@ -52,21 +50,16 @@ def stiffness(
     table = load_robot(robot)
     joint_stiffness(table, k)  # refused before the workspace is computed
     method: Method = "nonlinear" if nonlinear else "linear"
-    with output_folder(output, "stiffness", table.name) as folder:
+
+    def make() -> MapResult:
         places = reached_maps(table, limb, heights, resolution)
         with progress_bar("deflections") as done:
             maps = stiffness_maps(table, places, k, method, support, posture, done)
-        with atomic_write_bytes(folder / "stiffness.npz") as file:
-            file.write(npz_bytes(deflection_arrays(maps)))
-        if plots:
-            _draw(table, maps, folder)
-    if as_json:
-        print_json({**stiffness_data(table, maps), "folder": str(folder)})
-    else:
-        print(f"{table.name} on its {maps[0].support}: deflection of the {places[0].tip} ({method})")
-        print(aligned(_rows(maps), "  "))
-        print(f"files in {folder}")
-    return 0
+        title = f"{table.name} on its {maps[0].support}: deflection of the {places[0].tip} ({method})"
+        data = stiffness_data(table, maps)
+        return MapResult(deflection_arrays(maps), data, title, _rows(maps), _pictures(table, maps))
+
+    return made_maps("stiffness", table, make, plots, output, as_json)
 
 
 def stiffness_data(robot: Robot, maps: Sequence[DeflectionMap]) -> dict[str, Any]:
@@ -103,14 +96,12 @@ def _rows(maps: Sequence[DeflectionMap]) -> list[tuple[str, ...]]:
     return rows
 
 
-def _draw(robot: Robot, maps: Sequence[DeflectionMap], folder: Path) -> None:
+def _pictures(robot: Robot, maps: Sequence[DeflectionMap]) -> dict[str, Callable[[], Any]]:
     from screwkin.report.maps import deflection_overview, deflection_picture
-    from screwkin.report.style import save_figure, styled
 
-    with progress_bar("pictures") as done, styled():
-        save_figure(deflection_overview(robot, maps), folder / "stiffness.png")
-        for count, one in enumerate(maps):
-            if np.isfinite(one.magnitude).any():
-                figure = deflection_picture(robot, one)
-                save_figure(figure, folder / f"stiffness_{1e3 * one.place.height:g}mm.png")
-            done((count + 1) / len(maps))
+    each = {
+        f"stiffness_{1e3 * one.place.height:g}mm.png": partial(deflection_picture, robot, one)
+        for one in maps
+        if np.isfinite(one.magnitude).any()
+    }
+    return {"stiffness.png": partial(deflection_overview, robot, maps), **each}

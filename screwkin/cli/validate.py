@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from screwkin.analysis.engines import Yielding
 from screwkin.analysis.validate import Validation
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, TrajectoryPath
 from screwkin.cli.output import aligned, print_json, remark
 from screwkin.cli.simulation import Wish, simulate
 from screwkin.cli.simulation import engine as engine_named
-from screwkin.errors import OutputError
+from screwkin.errors import InputError, OutputError
 from screwkin.files import make_folder
 from screwkin.report.account import account_of, recorded_robot
 from screwkin.report.numbers import validation_numbers
+from screwkin.sim.compliant import Compliance
 from screwkin.trajectory import load_trajectory
 
 
@@ -28,6 +31,25 @@ def validate(
     ] = "pybullet",
     gui: Annotated[bool, typer.Option("--gui", help="Show a window, at the robot's own speed.")] = False,
     video: Annotated[bool, typer.Option("--video", help="Film it: walk.gif.")] = False,
+    compliant: Annotated[
+        bool, typer.Option("--compliant", help="Springs for servos, commanded at the trajectory's rate.")
+    ] = False,
+    k: Annotated[
+        float | None,
+        typer.Option(
+            "-k",
+            "--stiffness",
+            help="Of every spring [N m/rad]; default: what the commands are compensated for, or the table's.",
+        ),
+    ] = None,
+    sole_stiffness: Annotated[
+        float | None,
+        typer.Option(help="Of every point of contact [N/m], with or without --compliant; default: rigid."),
+    ] = None,
+    repeat: Annotated[
+        bool,
+        typer.Option("--repeat", help="With --compliant: also under other frictions and time steps."),
+    ] = False,
     plots: Annotated[bool, typer.Option(help="Draw the pictures and write the report.")] = True,
     output: OutputFolder = None,
     as_json: AsJson = False,
@@ -37,16 +59,14 @@ def validate(
     Without -o all files go beside the trajectory. Exit code 3 if it does not pass; the reasons are told.
     """
     engine_named(engine)
+    gives = _yielding(compliant, k, sole_stiffness, repeat)
     loaded = load_trajectory(trajectory)
     account = account_of(recorded_robot(loaded, str(trajectory)), loaded)
+    gives.for_trajectory(account.robot, loaded)  # refused before anything is written
     beside = _beside(trajectory)
-    wish = Wish(
-        engine,
-        gui,
-        video,
-        plots,
-        _commands(str(loaded.meta.get("command", "")), str(trajectory), engine, video),
-    )
+    words = ["screwkin", "validate", str(trajectory), *_changes(engine, gives, k), *(["--video"] * video)]
+    commands = _commands(str(loaded.meta.get("command", "")), words)
+    wish = Wish(engine, gui, video, plots, commands, gives)
     with output_folder(output or beside, "validate", account.robot.name) as folder:
         check = simulate(account, folder, beside / "validation.json", wish)
     if as_json:
@@ -79,9 +99,22 @@ def print_verdict(check: Validation) -> None:
         remark(f"warning: {warning}")
 
 
-def _commands(made: str, trajectory: str, engine: str, video: bool) -> list[str]:
+def _yielding(compliant: bool, k: float | None, sole_stiffness: float | None, repeat: bool) -> Yielding:
+    """What gives way, as a command line tells it."""
+    if not compliant and (repeat or k is not None):
+        raise InputError(f"{'--repeat' if repeat else '--stiffness'} is of elastic servos; add --compliant")
+    return Yielding(Compliance(k) if compliant else None, sole_stiffness, repeat)
+
+
+def _changes(engine: str, gives: Yielding, k: float | None) -> list[str]:
+    """The options that ask for another simulation than the usual one."""
+    words = ["--engine", engine] if engine != "pybullet" else []
+    words += ["--compliant"] if gives.servos is not None else []
+    words += [] if k is None else ["--stiffness", f"{k:g}"]
+    words += [] if gives.sole_stiffness is None else ["--sole-stiffness", f"{gives.sole_stiffness:g}"]
+    return words + (["--repeat"] if gives.repeat else [])
+
+
+def _commands(made: str, words: Sequence[str]) -> list[str]:
     """The command that made the trajectory, as it recorded it, and this one."""
-    words = ["screwkin", "validate", trajectory]
-    words += ["--engine", engine] if engine != "pybullet" else []
-    words += ["--video"] if video else []
     return [line for line in (made, shlex.join(words)) if line]

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from screwkin.cli.compensated import CompensateBy, Passes, ServoStiffness, compensated, remedy
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, RobotName, settings
 from screwkin.cli.output import aligned, print_json, progress_bar, remark
@@ -37,29 +38,43 @@ def walk(
         str | None,
         typer.Option(metavar="true|waist", help="What a preview gait steers: the CoM or the waist."),
     ] = None,
+    compensate: CompensateBy = None,
+    passes: Passes = None,
+    k: ServoStiffness = None,
     plots: Annotated[bool, typer.Option(help="Draw the pictures and write the report.")] = True,
     output: OutputFolder = None,
     as_json: AsJson = False,
 ) -> int:
     """Make the trajectory of a gait: trajectory.npz, trajectory.csv, plots and report.html.
 
+    With --compensate also compensated/trajectory.npz, the commands for servos that yield, beside the plan.
     Exit code 3 if a limb cannot reach, is singular or beyond a limit; the message names limb and time. A ZMP
     outside the support polygon is told, but the trajectory is still made.
     """
     table = load_robot(robot)
+    wanted = remedy(table, compensate, passes, k)
     assignments = [*(assignments or []), *([] if com is None else [f"com={com}"])]
     name = gait or default_gait(table.name)
     chosen = chosen_gait(name, assignments, rate)
     steps = chosen.steps if steps is None else steps
     command = command_of(robot, name, steps, assignments, rate)
     with output_folder(output, "walk", table.name) as folder:
-        account = make_trajectory(table, chosen, steps, command, folder)
+        account, told = _planned(table, chosen, steps, command), None
+        if wanted is not None:
+            command = shlex.join([*shlex.split(command), *wanted.words])
+            told = compensated(table, account.trajectory, wanted, command, folder)
+        _save(account, folder)
+        if told is not None:
+            told.save()
         if plots:
             write_report(account, folder)
     if as_json:
-        print_json({**walk_data(account), "gait": chosen.name, "folder": str(folder)})
+        extra = {} if told is None else {"compensation": told.to_dict()}
+        print_json({**walk_data(account), "gait": chosen.name, "folder": str(folder), **extra})
     else:
         _print_summary(account, chosen, folder)
+        if told is not None:
+            print(told.text())
     return 0
 
 
@@ -82,13 +97,21 @@ def command_of(robot: str, gait: str, steps: int, assignments: Sequence[str], ra
 
 def make_trajectory(robot: Robot, gait: Gait, steps: int, command: str, folder: Path) -> Account:
     """Make a trajectory and write it as ``.npz`` and ``.csv``."""
+    account = _planned(robot, gait, steps, command)
+    _save(account, folder)
+    return account
+
+
+def _planned(robot: Robot, gait: Gait, steps: int, command: str) -> Account:
     with progress_bar("walk") as done:
         trajectory = walk_of(robot, gait, steps, command)
         done(0.5)
-        account = account_of(robot, trajectory)
-    trajectory.save(folder / "trajectory.npz")
-    trajectory.save(folder / "trajectory.csv")
-    return account
+        return account_of(robot, trajectory)
+
+
+def _save(account: Account, folder: Path) -> None:
+    for ending in ("npz", "csv"):
+        account.trajectory.save(folder / f"trajectory.{ending}")
 
 
 def write_report(account: Account, folder: Path) -> Path:

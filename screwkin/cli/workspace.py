@@ -3,34 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from pathlib import Path
-from typing import Annotated, Any
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
 
 import numpy as np
-import typer
 
 from screwkin.analysis.map_arrays import workspace_arrays
 from screwkin.analysis.workspace import WorkspaceMap
-from screwkin.analysis.workspace import workspace as maps_of
-from screwkin.cli.folder import output_folder
+from screwkin.cli.maps import Heights, LimbName, MapResult, Pictures, Resolution, made_maps, reached_maps
 from screwkin.cli.options import AsJson, OutputFolder, RobotName
-from screwkin.cli.output import aligned, print_json, progress_bar
-from screwkin.errors import InputError, UnreachableError
-from screwkin.files import atomic_write_bytes, npz_bytes
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
-
-LimbName = Annotated[str | None, typer.Option(help="The limb; default: the first leg of the table.")]
-Heights = Annotated[
-    str | None,
-    typer.Option(
-        metavar="Z,Z,…",
-        help="Heights of the waist above the tip [m], as 0.35,0.4; default: five, by the limb's length.",
-    ),
-]
-Resolution = Annotated[float, typer.Option(help="Distance of grid points [m].")]
-Pictures = Annotated[bool, typer.Option("--plots/--no-plots", help="Draw the pictures.")]
 
 
 def workspace(
@@ -48,69 +32,14 @@ def workspace(
     The legs may meet: the map does not ask.
     """
     table = load_robot(robot)
-    with output_folder(output, "workspace", table.name) as folder:
+
+    def make() -> MapResult:
         maps = reached_maps(table, limb, heights, resolution)
-        with atomic_write_bytes(folder / "workspace.npz") as file:
-            file.write(npz_bytes(workspace_arrays(maps)))
-        if plots:
-            _draw(table, maps, folder)
-    if as_json:
-        print_json({**workspace_data(table, maps), "folder": str(folder)})
-    else:
-        print(f"{table.name}, {maps[0].limb}: reach with the tip held level, grid {1e3 * resolution:g} mm")
-        print(aligned(_rows(maps), "  "))
-        print(f"files in {folder}")
-    return 0
+        title = f"{table.name}, {maps[0].limb}: reach with the tip held level, grid {1e3 * resolution:g} mm"
+        data = workspace_data(table, maps)
+        return MapResult(workspace_arrays(maps), data, title, _rows(maps), _pictures(table, maps))
 
-
-def reached_maps(
-    robot: Robot, limb: str | None, heights: str | None, resolution: float
-) -> list[WorkspaceMap]:
-    """The workspace at the heights of a command line.
-
-    Raises:
-        UnreachableError: nothing is reached at any height.
-    """
-    name = first_leg(robot) if limb is None else limb
-    with progress_bar("workspace") as done:
-        maps = maps_of(robot, name, numbers(heights, "--heights"), resolution, done)
-    if not any(place.area for place in maps):
-        listed = ", ".join(f"{place.height:g}" for place in maps)
-        raise UnreachableError(
-            f"{maps[0].limb} reaches no point with its tip held level {listed} m below the waist; "
-            "take other heights, or a finer resolution",
-            maps[0].limb,
-        )
-    return maps
-
-
-def first_leg(robot: Robot) -> str:
-    """Name of the first leg of a table.
-
-    Raises:
-        InputError: it has none.
-    """
-    for limb in robot.limbs:
-        if limb.kind == "leg":
-            return limb.name
-    raise InputError(f"{robot.name} has no leg; name a limb of six joints or more by --limb")
-
-
-def numbers(text: str | None, option: str) -> list[float] | None:
-    """Finite numbers separated by commas.
-
-    Raises:
-        InputError: they are not.
-    """
-    if text is None:
-        return None
-    try:
-        values = [float(part) for part in text.split(",")]
-    except ValueError:
-        raise InputError(f"{option} {text!r} are no numbers; write them in m, as 0.35,0.4") from None
-    if not all(map(math.isfinite, values)):
-        raise InputError(f"{option} {text!r} holds NaN or infinity; write finite numbers in m")
-    return values
+    return made_maps("workspace", table, make, plots, output, as_json)
 
 
 def workspace_data(robot: Robot, maps: Sequence[WorkspaceMap]) -> dict[str, Any]:
@@ -155,14 +84,12 @@ def _rows(maps: Sequence[WorkspaceMap]) -> list[tuple[str, ...]]:
     return rows
 
 
-def _draw(robot: Robot, maps: Sequence[WorkspaceMap], folder: Path) -> None:
+def _pictures(robot: Robot, maps: Sequence[WorkspaceMap]) -> dict[str, Callable[[], Any]]:
     from screwkin.report.maps import workspace_overview, workspace_picture
-    from screwkin.report.style import save_figure, styled
 
     most = max(_best(place) for place in maps if place.area)
-    with progress_bar("pictures") as done, styled():
-        save_figure(workspace_overview(robot, maps, most), folder / "workspace.png")
-        for k, place in enumerate(maps):
-            figure = workspace_picture(robot, place, most)
-            save_figure(figure, folder / f"workspace_{1e3 * place.height:g}mm.png")
-            done((k + 1) / len(maps))
+    each = {
+        f"workspace_{1e3 * place.height:g}mm.png": partial(workspace_picture, robot, place, most)
+        for place in maps
+    }
+    return {"workspace.png": partial(workspace_overview, robot, maps, most), **each}

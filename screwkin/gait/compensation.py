@@ -18,7 +18,7 @@ Source: paper B, section 5, algorithm of four steps (``swing``); docs/papers.md.
 from __future__ import annotations
 
 import numbers
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -44,6 +44,13 @@ Model = Literal["linear", "nonlinear", "dynamic"]
 
 METHODS: tuple[Method, ...] = ("swing", "joint")
 MODELS: tuple[Model, ...] = ("linear", "nonlinear", "dynamic")
+Way = Literal["swing", "joint", "dynamic"]
+WAYS: Mapping[Way, tuple[Method, Model]] = {
+    "swing": ("swing", "nonlinear"),
+    "joint": ("joint", "linear"),
+    "dynamic": ("joint", "dynamic"),
+}
+"""Method and model by name: the foot in the air, all joints by statics, all joints by the walk's torques."""
 LIMIT_SLACK = 1e-9
 """How far rounding may take a joint beyond its limits [rad or m]."""
 
@@ -87,7 +94,7 @@ def compensate(
         "passes": int(passes),
         "stiffness": dict(zip(robot.joint_names, k.tolist(), strict=True)),
     }
-    qd = trajectory.qd + _rates(trajectory.time, last)
+    qd = trajectory.qd + change_rates(trajectory.time, last)
     return replace(trajectory, q=q, qd=qd, meta={**trajectory.meta, "compensation": told})
 
 
@@ -243,7 +250,7 @@ def _reached(robot: Robot, trajectory: Trajectory, shifts: Array, guess: Array) 
     return np.where(moved, solution.state.q, guess)
 
 
-def _rates(time: Array, change: Array) -> Array:
+def change_rates(time: Array, change: Array) -> Array:
     """Rates (T, n) of a change of the joint positions that overshoots nowhere, though it jumps at liftoff."""
     from scipy.interpolate import PchipInterpolator
 
@@ -262,6 +269,29 @@ def _check_limits(robot: Robot, trajectory: Trajectory, q: Array) -> None:
             f"{factor * q[row, i]:.1f} {unit}, beyond its limits {factor * lower[i]:.1f} to "
             f"{factor * upper[i]:.1f} {unit}; bend the leg less in the gait, or raise the stiffness"
         )
+
+
+def way_of(trajectory: Trajectory) -> Way | Literal["none"]:
+    """How a trajectory is compensated, by name.
+
+    Raises:
+        InputError: its ``meta`` tells something else.
+    """
+    told = trajectory.meta.get("compensation")
+    if told is None:
+        return "none"
+    found = (told.get("method"), told.get("model")) if isinstance(told, Mapping) else (None, None)
+    for way, (method, model) in WAYS.items():
+        if found[0] == method and (found[1] == "dynamic") == (model == "dynamic"):
+            return way
+    raise InputError(f"meta tells of a compensation {told!r} that is not known; valid: {', '.join(WAYS)}")
+
+
+def stiffness_of(trajectory: Trajectory) -> StiffnessChoice:
+    """The joints' stiffness that a trajectory is compensated for; None if it is not."""
+    told = trajectory.meta.get("compensation")
+    given = told.get("stiffness") if isinstance(told, Mapping) else None
+    return dict(given) if isinstance(given, Mapping) else None
 
 
 def _check_choices(method: str, passes: object, model: str) -> None:

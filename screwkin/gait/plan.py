@@ -79,7 +79,7 @@ def plan(gait: Gait, stance: Stance, steps: int) -> Plan:
     Raises:
         InputError: ``steps`` is no whole number above 0.
         GaitError: another kind of gait, a swing below the floor, too many samples, or numbers too large.
-        NoSolutionError: the soles overlap.
+        NoSolutionError: the feet overlap.
 
     Source: walking paper (docs/papers.md, A), eq. 16-24, generalised to arcs and to stepping sideways.
     """
@@ -110,7 +110,7 @@ def plan_around(
     """The plan whose waist moves as given, x, y, z, yaw (T, 4), with feet and hands by the gait's phase (T,).
 
     Raises:
-        GaitError: a swing below the floor, or numbers too large. NoSolutionError: the soles overlap.
+        GaitError: a swing below the floor, or numbers too large. NoSolutionError: the feet overlap.
     """
     with np.errstate(all="ignore"):
         holds = footholds(gait, stance, steps)

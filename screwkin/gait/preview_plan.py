@@ -54,7 +54,7 @@ def preview_plan(robot: Robot, mechanism: Mechanism, gait: Gait, steps: int) -> 
         Plan of (steps + 2) Tc rate samples.
 
     Raises:
-        GaitError: a setting is missing or wrong. NoSolutionError: out of reach, or soles that overlap.
+        GaitError: a setting is missing or wrong. NoSolutionError: out of reach, or feet that overlap.
     """
     steps = whole_steps(steps)
     settings = _settings(gait)

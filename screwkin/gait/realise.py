@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
 
-from screwkin.errors import InputError, SingularError
+from screwkin.errors import InputError
 from screwkin.gait.balance import sole_corners
 from screwkin.gait.plan import Plan
 from screwkin.gait.stance import LEFT, RIGHT, Foot, Hand, Stance
@@ -17,16 +17,29 @@ from screwkin.kernel.pose import solve_pose_fast
 from screwkin.kernel.records import identifier
 from screwkin.kernel.run import FROM, run
 from screwkin.kinematics.positions import frame_pose, link_displacements
-from screwkin.mechanism.choice import RANK_TOLERANCE
 from screwkin.mechanism.mechanism import Mechanism
 from screwkin.mechanism.network import blend, coupling_twists, network_matrix
 from screwkin.mechanism.virtual_motion import primary_motion
-from screwkin.model.robot import Robot
+from screwkin.model.robot import Limb, Robot
 from screwkin.model.state import State
-from screwkin.se3 import Twist, as_array, pose_from_array, twist_from_array, unstack, vector_from_array
+from screwkin.se3 import (
+    Twist,
+    Vector,
+    as_array,
+    pose_from_array,
+    twist_from_array,
+    unstack,
+    vector_from_array,
+)
 from screwkin.solve.pose import PoseSolution
-from screwkin.solve.rates import block_names, secondary_accelerations, secondary_rates, singular_values
-from screwkin.solve.status import Status
+from screwkin.solve.rates import (
+    SecondarySolution,
+    block_names,
+    secondary_accelerations,
+    secondary_rates,
+    singular_values,
+)
+from screwkin.solve.singularity import refuse_singular
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -48,7 +61,7 @@ def stance_of(robot: Robot) -> Stance:
         side = LEFT if p.y > 0 else RIGHT
         if limb.kind == "leg":
             outline = tuple((float(x), float(y)) for x, y, _ in sole_corners(robot, limb.tip))
-            feet.append(Foot(limb.tip, side, outline))
+            feet.append(Foot(limb.tip, side, outline, _body(robot, limb)))
             places.append(abs(float(p.y)))
         else:
             root = robot.joints[robot.path_to(limb.link)[0]].screw.s0
@@ -56,6 +69,16 @@ def stance_of(robot: Robot) -> Stance:
     if sorted(foot.side for foot in feet) != [RIGHT, LEFT]:
         raise InputError(f"robot {robot.name} has {len(feet)} legs; a walk needs one on either side")
     return Stance(sum(places) / len(places), tuple(feet), tuple(hands))
+
+
+def _body(robot: Robot, limb: Limb) -> tuple[tuple[float, float], ...]:
+    """Corners (x, y) of the boxes of a limb's last link, in the frame of its tip [m]."""
+    corners = [
+        limb.frame.inverse @ (box.center + Vector(a * box.size.x, b * box.size.y, c * box.size.z) * 0.5)
+        for box in robot.link(limb.link).boxes
+        for a, b, c in product((-1, 1), repeat=3)
+    ]
+    return tuple((float(corner.x), float(corner.y)) for corner in corners)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,16 +132,16 @@ def differentiate(mechanism: Mechanism, made: Plan, state: State) -> Motion:
     twists = coupling_twists(mechanism, T.R, q)
     N = network_matrix(mechanism, twists, (len(made.time),))
     if len(made.time) >= FROM and follows(robot := mechanism.robot, mechanism.secondary):
-        sigma = singular_values(mechanism, N)
-        _refuse_singular(block_names(mechanism), sigma, made)
         qd, qdd = _compiled_motion(robot, made, state.q)
-        return Motion(state.q, qd, qdd, sigma, block_names(mechanism))
+        found = SecondarySolution(qd, singular_values(mechanism, N), block_names(mechanism))
+        refuse_singular(mechanism, N, found, made.time)
+        return Motion(state.q, qd, qdd, found.sigma, found.blocks)
     first, second = _imposed(made, 0), _imposed(made, 1)
     order, batch = mechanism.primary, (len(made.time),)
     rates = primary_motion(mechanism, T, q, first)
     primary = as_array([rates[name] for name in order], batch)
     secondary = secondary_rates(mechanism, N, primary)
-    _refuse_singular(secondary.blocks, secondary.sigma, made)
+    refuse_singular(mechanism, N, secondary, made.time)
     everything = blend(mechanism.primary_columns, primary, mechanism.secondary_columns, secondary.values)
     accelerations = primary_motion(mechanism, T, q, first, second)
     driven = as_array([accelerations[name] for name in order], batch)
@@ -149,15 +172,3 @@ def _compiled_motion(robot: Robot, made: Plan, q: Array) -> tuple[Array, Array]:
             inputs[identifier(limb.tip + suffix)] = told if whole else told[:, 3:]
     found = run(motion(robot, accelerations=True), inputs)
     return found["qd"], found["qdd"]
-
-
-def _refuse_singular(blocks: Sequence[str], sigma: Array, made: Plan) -> None:
-    singular = sigma < RANK_TOLERANCE
-    if singular.any():
-        sample, block = (int(i) for i in np.argwhere(singular)[0])
-        raise SingularError(
-            f"{blocks[block]}, sample {sample} (t = {made.time[sample]:.3f} s): singular; "
-            f"{Status.SINGULAR.help}",
-            blocks[block],
-            sample,
-        )

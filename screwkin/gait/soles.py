@@ -1,4 +1,4 @@
-"""Whether the soles, seen from above, run into each other."""
+"""Whether the feet, seen from above, run into each other."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def separation(a: Array, b: Array) -> Array:
 
 
 def check_soles(gait: Gait, stance: Stance, feet: dict[str, Motion], time: Array) -> float:
-    """Smallest gap between the soles [m], seen from above, over all samples.
+    """Smallest gap between the feet [m], seen from above, over all samples.
 
     The swing foot counts as well: it passes too low to pass over the other.
 
@@ -50,13 +50,14 @@ def check_soles(gait: Gait, stance: Stance, feet: dict[str, Motion], time: Array
     """
     first, second = stance.feet
     a, b = (
-        outlines(convex_hull(np.asarray(foot.sole, dtype=float)), feet[foot.name]) for foot in (first, second)
+        outlines(convex_hull(np.asarray(foot.sole + foot.body, dtype=float)), feet[foot.name])
+        for foot in (first, second)
     )
     gap = separation(a, b)
     if gap.min() < -_TOUCH:
         early = int(np.argmax(gap < -_TOUCH))
         raise NoSolutionError(
-            f"gait {gait.name}: the soles of {first.name} and {second.name} overlap from"
+            f"gait {gait.name}: {first.name} and {second.name} overlap from"
             f" {time[early]:.3f} s on, by up to {-1e3 * gap.min():.1f} mm. {_advice(gait)}"
         )
     return float(gap.min())

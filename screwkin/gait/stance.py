@@ -13,11 +13,15 @@ LEFT, RIGHT = 1, -1
 
 @dataclass(frozen=True)
 class Foot:
-    """A foot: name of its tip, side (+1 left, -1 right), corners (x, y) of its sole in the tip frame [m]."""
+    """A foot: name of its tip, side (+1 left, -1 right), corners (x, y) of its sole in the tip frame [m].
+
+    body: further corners, of what stands out above the sole.
+    """
 
     name: str
     side: int
     sole: tuple[tuple[float, float], ...]
+    body: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ import numpy as np
 
 from screwkin.errors import TableError, TrajectoryError
 from screwkin.gait.balance import Balance, zmp
+from screwkin.gait.intended import intended
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.mechanism.choice import closed_mechanism
 from screwkin.mechanism.network import coupling_twists, network_matrix
@@ -35,6 +36,8 @@ class Account:
 
     robot: Robot
     trajectory: Trajectory
+    motion: Trajectory
+    """What the robot is to do: the trajectory itself, unless its joints are compensated commands."""
     balance: Balance
     sigma: Mapping[str, Array]
     """Least length-normalised singular value (T,) of every limb."""
@@ -45,7 +48,7 @@ class Account:
     def closure(self) -> Mapping[str, tuple[float, float]]:
         """For every tip: largest distance [m] and angle [rad] from where the joints carry it."""
         T = pose_from_array(self.trajectory.T_world_base)
-        D = link_displacements(self.robot, unstack(self.trajectory.q))
+        D = link_displacements(self.robot, unstack(self.motion.q))
         errors = {}
         for tip, told in self.trajectory.T_world_tip.items():
             reached = as_array(T @ frame_pose(self.robot, D, tip), (self.trajectory.samples,))
@@ -138,7 +141,8 @@ def account_of(robot: Robot, trajectory: Trajectory) -> Account:
     """
     _check_tips(robot, trajectory)
     with np.errstate(over="ignore", invalid="ignore"):
-        balance = zmp(robot, trajectory)
+        motion = intended(robot, trajectory)
+        balance = zmp(robot, motion)
     finite = np.isfinite(np.hstack([balance.wrench, balance.zmp])).all(axis=1)
     if not finite.all():
         raise TrajectoryError(
@@ -147,12 +151,12 @@ def account_of(robot: Robot, trajectory: Trajectory) -> Account:
         )
     mechanism = closed_mechanism(robot)
     T = pose_from_array(trajectory.T_world_base)
-    twists = coupling_twists(mechanism, T.R, unstack(trajectory.q))
+    twists = coupling_twists(mechanism, T.R, unstack(motion.q))
     N = network_matrix(mechanism, twists, (trajectory.samples,))
     sigma = singular_values(mechanism, N)
     names = [block_name(mechanism, circuits) for circuits, _ in mechanism.blocks]
     by_limb = {name: sigma[:, i] for i, name in enumerate(names)}
-    return Account(robot, trajectory, balance, by_limb, singularity_report(mechanism, N))
+    return Account(robot, trajectory, motion, balance, by_limb, singularity_report(mechanism, N))
 
 
 def recorded_robot(trajectory: Trajectory, path: str = "the trajectory") -> Robot:

@@ -156,11 +156,7 @@ def seen_from_above(account: Account) -> Figure:
     figure, axes = new_figure(1.0 + float(np.clip(8.0 * size[1] / size[0], 1.2, 5.5)))
     for polygon in _different([polygon for _, _, polygon in support_polygons(account)]):
         axes.fill(*polygon.T, facecolor="#77777712", edgecolor="#77777755", linewidth=0.6)
-    for k, (foot, colour) in enumerate(foot_colours(account).items()):
-        for n, (begin, _) in enumerate(_placements(soles[:, k], trajectory.contact[:, k])):
-            label = f"{shown(foot)} on the floor" if n == 0 else None
-            corners = np.vstack([soles[begin, k], soles[begin, k, :1]])
-            axes.plot(*corners.T, color=colour, linewidth=1.3, label=label)
+    draw_soles(axes, account, soles)
     axes.fill([], [], facecolor="#77777722", edgecolor="#77777777", label="support polygons")
     axes.plot(*balance.com[:, :2].T, color=GCOM, label="GCoM")
     axes.plot(*balance.zmp.T, color=ZMP, linewidth=1.1, label="ZMP")
@@ -173,6 +169,15 @@ def seen_from_above(account: Account) -> Figure:
     axes.set_ylabel("y [m]")
     legend_above(figure, [axes], columns=6)
     return figure
+
+
+def draw_soles(axes: Axes, account: Account, soles: Array) -> None:
+    """Outlines of the soles (T, feet, corners, 2) [m], once in every place where one stands."""
+    for k, (foot, colour) in enumerate(foot_colours(account).items()):
+        for n, (begin, _) in enumerate(_placements(soles[:, k], account.trajectory.contact[:, k])):
+            label = f"{shown(foot)} on the floor" if n == 0 else None
+            corners = np.vstack([soles[begin, k], soles[begin, k, :1]])
+            axes.plot(*corners.T, color=colour, linewidth=1.3, label=label)
 
 
 def _different(polygons: Sequence[Array]) -> list[Array]:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from screwkin.analysis.bench import Bench
+from screwkin.analysis.compliance import Trial
 from screwkin.analysis.measures_leg import compensated_of, map_of, sinking_of, zmp_lines
+from screwkin.analysis.measures_springs import trial_of
 from screwkin.errors import InputError
+from screwkin.gait.balance import soles_on_floor
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.report import balance, frames, maps, motion
 from screwkin.report.style import (
@@ -25,8 +29,10 @@ from screwkin.report.style import (
     time_axis,
 )
 from screwkin.se3 import as_array, unstack
+from screwkin.sim.measure import ZmpRecord
 
 Drawing = Callable[..., Figure]
+Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def feet_along_x(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
@@ -146,25 +152,116 @@ def compensated_joints(bench: Bench, gait: str, limb: str, stiffness: float, rob
     return figure
 
 
+def foot_from_waist(bench: Bench, gait: str, limb: str, stiffness: float, robot: str = "") -> Figure:
+    """The foot seen from the waist along x, y and z, as intended and as compensation commands it."""
+    account = bench.account(gait, None, robot)
+    intended, told = _seen_from_waist(bench, gait, limb, stiffness, robot)
+    figure, axes = new_figure(6.0, 3, sharex=True)
+    for k, one in enumerate(axes):
+        shade_swings(one, account)
+        one.plot(account.trajectory.time, 1e3 * intended[:, k], color=PLAIN, label="intended")
+        one.plot(account.trajectory.time, 1e3 * told[:, k], "--", color=SIDES[0], label="commanded")
+        one.set_ylabel(f"{'xyz'[k]} [mm]")
+    time_axis(axes[-1], account)
+    legend_above(figure, [axes[0]])
+    return figure
+
+
 def compensated_foot(bench: Bench, gait: str, limb: str, stiffness: float, robot: str = "") -> Figure:
     """By how much compensation moves the commanded foot, seen from the waist."""
     account = bench.account(gait, None, robot)
-    table, q = account.robot, account.trajectory.q
-    told = compensated_of(bench, gait, stiffness, "swing", robot).q
-    tip = table.limb(limb).tip
-    places = [
-        as_array(frame_pose(table, link_displacements(table, unstack(each)), tip), (len(q),))[:, :3, 3]
-        for each in (q, told)
-    ]
+    intended, told = _seen_from_waist(bench, gait, limb, stiffness, robot)
     figure, axes = new_figure(3.0)
     shade_swings(axes, account)
     for k, colour in enumerate((SIDES[0], SIDES[1], PLAIN)):
-        moved = 1e3 * (places[1] - places[0])[:, k]
+        moved = 1e3 * (told - intended)[:, k]
         axes.plot(account.trajectory.time, moved, color=colour, label="xyz"[k], linestyle=LINES[k])
-    axes.set_ylabel(f"{shown(tip)} moved by [mm]")
+    axes.set_ylabel(f"{shown(account.robot.limb(limb).tip)} moved by [mm]")
     time_axis(axes, account)
     legend_above(figure, [axes])
     return figure
+
+
+def _seen_from_waist(bench: Bench, gait: str, limb: str, stiffness: float, robot: str) -> list[Array]:
+    """Places (T, 3) [m] of a limb's tip in the waist's frame, as intended and as commanded."""
+    account = bench.account(gait, None, robot)
+    told = compensated_of(bench, gait, stiffness, "swing", robot).q
+    tip = account.robot.limb(limb).tip
+    return [
+        as_array(frame_pose(account.robot, link_displacements(account.robot, unstack(q)), tip), (len(q),))[
+            :, :3, 3
+        ]
+        for q in (account.trajectory.q, told)
+    ]
+
+
+def sprung_zmp(
+    bench: Bench, gait: str, treatments: Sequence[str], stiffness: float, robot: str = ""
+) -> Figure:
+    """ZMP against time of a walk on elastic joints, simulated: wanted, and with every treatment."""
+    account = bench.account(gait, None, robot)
+    wanted = zmp_lines(bench, gait, None, robot)[0]
+    figure, axes = new_figure(5.6, 2, sharex=True)
+    for k, one in enumerate(axes):
+        shade_swings(one, account)
+        for treatment, style in zip(treatments, _TREATED, strict=False):
+            trial, zmp = _run_of(bench, gait, treatment, stiffness, robot)
+            one.plot(zmp.time, 1e3 * zmp.contact[:, k], label=_treated(trial), **style)
+        one.plot(
+            account.trajectory.time, 1e3 * wanted[:, k], color="#222222", linewidth=0.9, label="ZMP wanted"
+        )
+        one.set_ylabel(f"{'xy'[k]} [mm]")
+    time_axis(axes[1], account)
+    legend_above(figure, [axes[0]], columns=4)
+    return figure
+
+
+def sprung_zmp_above(
+    bench: Bench, gait: str, treatments: Sequence[str], stiffness: float, robot: str = ""
+) -> Figure:
+    """The same from above, one panel for each treatment, with the soles where the plan puts them."""
+    account = bench.account(gait, None, robot)
+    trajectory = account.trajectory
+    soles = soles_on_floor(account.robot, trajectory.feet, trajectory.T_world_tip)
+    wanted = zmp_lines(bench, gait, None, robot)[0]
+    figure, axes = new_figure(
+        0.8 + 1.55 * len(treatments), len(treatments), sharex=True, sharey=True, squeeze=False
+    )
+    for one, treatment, style in zip(axes[:, 0], treatments, _TREATED, strict=False):
+        balance.draw_soles(one, account, soles)
+        trial, zmp = _run_of(bench, gait, treatment, stiffness, robot)
+        one.plot(*zmp.contact.T, label=_treated(trial), **style)
+        one.plot(*wanted.T, color="#222222", linewidth=0.9, label="ZMP wanted")
+        one.set_aspect("equal")
+        one.set_ylabel("y [m]")
+    axes[-1, 0].set_xlabel("x [m]")
+    legend_above(figure, list(axes[:, 0]), columns=3)
+    return figure
+
+
+_TREATED = (
+    {"color": MEASURED, "linewidth": 1.0},
+    {"color": SIDES[3], "linewidth": 1.0},
+    {"color": SIDES[2], "linewidth": 1.0, "linestyle": "--"},
+)
+"""Lines of a figure's treatments, in their order."""
+
+
+def _run_of(bench: Bench, gait: str, treatment: str, stiffness: float, robot: str) -> tuple[Trial, ZmpRecord]:
+    trial = trial_of(bench, gait, treatment, stiffness, robot=robot)
+    if trial.zmp is None:
+        raise InputError(f"the run with treatment {treatment} tells no ZMP")
+    return trial, trial.zmp
+
+
+def _treated(trial: Trial) -> str:
+    told = {
+        "none": "without compensation",
+        "swing": "swing foot compensated",
+        "joint": "joints compensated",
+    }
+    fell = "" if trial.fell_at is None else f", falls at {trial.fell_at:.1f} s"
+    return told.get(trial.treatment, "joints led by the walk's torques") + fell
 
 
 _ALL: tuple[Drawing, ...] = (
@@ -183,7 +280,10 @@ _ALL: tuple[Drawing, ...] = (
     deflection_parts,
     preview,
     compensated_joints,
+    foot_from_waist,
     compensated_foot,
+    sprung_zmp,
+    sprung_zmp_above,
 )
 
 DRAWINGS: Mapping[str, Drawing] = {drawing.__name__: drawing for drawing in _ALL}

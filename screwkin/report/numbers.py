@@ -109,7 +109,28 @@ def validation_numbers(check: Validation) -> list[Number]:
         rows.append(
             Number("largest torque", f"{100 * check.torque_use[name]:.0f} %", f"of its limit: {name}")
         )
-    return rows
+    if check.joint_stiffness is not None:
+        k = sorted(set(check.joint_stiffness.values()))
+        told = f"{k[0]:g}" if len(k) == 1 else f"{k[0]:g} to {k[-1]:g}"
+        rows.append(
+            Number("elastic servos", f"{told} N m/rad", f"compensation in the commands: {check.compensation}")
+        )
+    if check.sole_stiffness is not None:
+        rows.append(Number("elastic soles", f"{check.sole_stiffness:g} N/m", "at every point of contact"))
+    return rows + _repetitions(check)
+
+
+def _repetitions(check: Validation) -> list[Number]:
+    """What runs under other frictions and time steps tell."""
+    row = check.repeated
+    if row is None:
+        return []
+    fell = Number("repeated runs", str(row.runs), f"{row.fallen} fell")
+    if row.median_mm is None or row.range_mm is None:
+        return [fell]
+    (x, y), ((x0, x1), (y0, y1)) = row.median_mm, row.range_mm
+    span = f"x {x0:.1f} to {x1:.1f}, y {y0:.1f} to {y1:.1f} mm, of those that did not fall"
+    return [fell, Number("their largest ZMP errors, median", f"{x:.1f} / {y:.1f} mm", span)]
 
 
 def _gap(a: Any, b: Any) -> Any:

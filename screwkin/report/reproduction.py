@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from screwkin.analysis.bench import Bench
-from screwkin.analysis.measures import argument_faults
+from screwkin.analysis.measures import check_call
 from screwkin.analysis.papers import Paper, Picture
 from screwkin.analysis.reproduce import MARKS, Line, Measured, Reproduction, written
-from screwkin.errors import InputError, MissingDependencyError, UnknownNameError
+from screwkin.errors import MissingDependencyError
 from screwkin.files import atomic_write, atomic_write_bytes
 from screwkin.report.drawings import DRAWINGS
 from screwkin.report.style import DPI, styled
@@ -41,11 +41,7 @@ def check_pictures(paper: Paper) -> None:
     """
     for section in paper.sections:
         for picture in section.pictures:
-            if picture.draw not in DRAWINGS:
-                raise UnknownNameError(f"drawing of {section.place!r}", picture.draw, list(DRAWINGS))
-            wrong = argument_faults(DRAWINGS[picture.draw], picture.with_)
-            if wrong:
-                raise InputError(f"{section.place}: drawing {picture.draw} has {wrong}")
+            check_call("drawing", picture.draw, DRAWINGS, picture.with_, section.place)
 
 
 def draw_pictures(

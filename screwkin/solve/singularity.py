@@ -13,9 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from screwkin.errors import SingularError
 from screwkin.mechanism.choice import characteristic_length, normalised
 from screwkin.mechanism.mechanism import Mechanism
-from screwkin.solve.rates import block_name, block_rows
+from screwkin.solve.rates import SecondarySolution, block_name, block_rows
+from screwkin.solve.status import Status
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -63,6 +65,25 @@ def singularity_report(mechanism: Mechanism, N: Array) -> tuple[LimbSingularity,
             LimbSingularity(block_name(mechanism, circuits), worst, float(sigma[worst]), near, taken, cause)
         )
     return tuple(report)
+
+
+def refuse_singular(
+    mechanism: Mechanism, N: Array, solution: SecondarySolution, time: Array | None = None
+) -> None:
+    """Raise for the first singular sample of a solution with the network matrix N (..., rows, couplings).
+
+    Raises:
+        SingularError: names limb, sample, its time [s] where times (T,) are given, and the cause.
+    """
+    if not solution.singular.any():
+        return
+    flat = np.reshape(solution.singular, (-1, solution.singular.shape[-1]))
+    sample, block = (int(i) for i in np.argwhere(flat)[0])
+    here = np.reshape(np.asarray(N), (-1, *N.shape[-2:]))[sample]
+    limb, cause = solution.blocks[block], singularity_report(mechanism, here)[block].cause
+    when = "" if time is None else f" (t = {time[sample]:.3f} s)"
+    message = f"{limb}, sample {sample}{when}: singular; {cause}; {Status.SINGULAR.help}"
+    raise SingularError(message, limb, sample)
 
 
 def _screws(N: Array, mechanism: Mechanism, columns: Sequence[int]) -> Array:

@@ -11,13 +11,18 @@ import numpy as np
 import pytest
 
 from screwkin.analysis.bench import Bench
+from screwkin.analysis.compliance import Trial, summarised
 from screwkin.analysis.measures import MEASURES
+from screwkin.analysis.measures_leg import zmp_lines
+from screwkin.analysis.measures_springs import FRICTIONS
 from screwkin.analysis.papers import load_paper, parse_paper
 from screwkin.analysis.reproduce import agreement, check_paper, reproduce, written
 from screwkin.errors import FileFaults, InputError, UnknownNameError
 from screwkin.model.library import find_robot, paper_names, robot_names
 from screwkin.report.drawings import DRAWINGS
 from screwkin.report.reproduction import check_pictures, draw_pictures, write_pages
+from screwkin.report.style import styled
+from screwkin.sim.measure import ZmpRecord
 
 PAGES = Path(__file__).resolve().parents[2] / "docs" / "reproduction"
 SMALL = """
@@ -195,3 +200,34 @@ def test_the_pages_show_values_reasons_and_pictures_and_stand_alone(tmp_path):
     assert "http" not in html
     assert "screwkin reproduce small" in text
     assert "screwkin reproduce small" in html
+
+
+def test_a_paper_changes_its_gaits_before_anything_else_does():
+    robot, changes = 'robot = "bioloid"', "changes = { Tc = 2.0, lift = 0.02 }"
+    paper = parse_paper(SMALL.replace(robot, f"{robot}\n{changes}"))
+    gait = Bench(paper.robot, paper.changes).gait("paper", {"lift": 0.01})
+    assert (gait.Tc, gait.lift) == (2.0, 0.01)
+    with pytest.raises(FileFaults, match=r"changes.*no table"):
+        parse_paper(SMALL.replace(robot, f"{robot}\nchanges = 2"))
+
+
+def test_figures_of_a_walk_on_springs_show_every_treatment_and_who_falls():
+    """Drawn from made-up runs: the ZMP wanted, 10 mm aside; none of the text depends on a simulation."""
+    bench = Bench("poppy12", {"steps": 2})
+    account = bench.account("poppy12-preview")
+    wanted = zmp_lines(bench, "poppy12-preview")[0]
+    record = ZmpRecord(account.trajectory.time, wanted + 0.01, wanted, wanted)
+    trials = [
+        Trial("none", 0.8, 5e-4, None, (10.0, 10.0)),
+        Trial("none", 1.0, 5e-4, 2.5, (10.0, 10.0), record),
+        Trial("swing", 1.0, 5e-4, None, (10.0, 10.0), record),
+    ]
+    bench.once(("springs", account.trajectory.sha256, 100.0, *FRICTIONS), lambda: summarised(trials))
+    told = {"gait": "poppy12-preview", "treatments": ["none", "swing"], "stiffness": 100.0}
+    for draw in ("sprung_zmp", "sprung_zmp_above"):
+        with styled():
+            figure = DRAWINGS[draw](bench, **told)
+            figure.canvas.draw()
+        labels = {text.get_text() for legend in figure.legends for text in legend.get_texts()}
+        assert {"ZMP wanted", "without compensation, falls at 2.5 s", "swing foot compensated"} <= labels
+        assert len(figure.axes) == 2

@@ -157,6 +157,56 @@ def test_an_unknown_engine_is_refused_before_anything_is_simulated(cli, refused,
     assert "unknown engine 'gazebo'; valid: pybullet, kinematic" in message
 
 
+@pytest.mark.parametrize(
+    ("words", "named"),
+    [
+        (["--stiffness", "60"], "--stiffness is of elastic servos; add --compliant"),
+        (["--repeat"], "--repeat is of elastic servos; add --compliant"),
+        (["--compliant", "--stiffness", "0"], "stiffness is 0.0; it must be a positive number in N m/rad"),
+        (["--compliant", "-k", "-5"], "stiffness is -5.0; it must be a positive number in N m/rad"),
+        (["--compliant", "-k", "nan"], "stiffness is nan; it must be a positive number in N m/rad"),
+        (["--sole-stiffness", "0"], "sole_stiffness is 0.0; it must be a positive number in N/m"),
+        (["--compliant", "-k", "60", "--engine", "kinematic"], "nothing yields in it; use pybullet"),
+        (["--sole-stiffness", "2e4", "--engine", "kinematic"], "nothing yields in it; use pybullet"),
+        (["--compliant"], "bioloid has no joint stiffness; give one in N m/rad"),
+        (["--compliant", "-k", "1e6"], "is too long for joints of 1e+06 N m/rad"),
+    ],
+)
+def test_what_cannot_yield_so_is_told_once_and_nothing_is_written(
+    cli, refused, walked, tmp_path, words, named
+):
+    (tmp_path / "t.npz").write_bytes((walked / "trajectory.npz").read_bytes())
+    assert named in refused(cli("validate", "t.npz", *words), 2)
+    assert [path.name for path in tmp_path.iterdir()] == ["t.npz"]
+
+
+def test_elastic_servos_stand_with_compensated_commands_and_tell_every_run(cli, tmp_path):
+    walk = ("walk", "poppy12", "--steps", 1, "--no-plots", "-o", "out", "--compensate", "joint", "-k", 100)
+    assert cli(*walk).code == 0
+    called = cli("validate", "out/compensated/trajectory.npz", "--compliant", "--repeat", "--no-plots")
+    assert called.code == 0, called.out + called.err
+    told = json.loads((tmp_path / "out/compensated/validation.json").read_text(encoding="utf-8"))
+    assert told["engine"] == "pybullet-compliant"
+    assert told["compensation"] == "joint"
+    assert set(told["joint_stiffness"].values()) == {100.0}
+    repeated = told["repeated"]
+    assert (repeated["runs"], repeated["fallen"]) == (4, 0)
+    assert len({(trial["friction"], trial["dt"]) for trial in repeated["trials"]}) == 4
+    assert max(repeated["median_mm"]) < 40
+    assert "repeated runs" in called.out
+
+
+def test_a_robot_too_soft_for_its_weight_is_told_to_fall_in_every_run(cli):
+    assert cli("walk", "poppy12", "--steps", 1, "--no-plots", "-o", "out").code == 0
+    words = ("validate", "out/trajectory.npz", "--compliant", "--stiffness", 5, "--repeat", "--no-plots")
+    called = cli(*words, "--json")
+    assert called.code == 3
+    assert called.data["fell"] is True
+    assert called.data["repeated"]["fallen"] == 4
+    assert called.data["repeated"]["median_mm"] is None
+    assert any("falls in 4 of 4 repetitions" in reason for reason in called.data["reasons"])
+
+
 def test_a_robot_that_only_follows_orders_never_passes(cli, walked, tmp_path):
     (tmp_path / "t.npz").write_bytes((walked / "trajectory.npz").read_bytes())
     called = cli("validate", "t.npz", "--engine", "kinematic", "--no-plots", "--json")

@@ -99,6 +99,34 @@ def test_joints_faster_than_their_servos_are_a_warning(cli):
     assert any("speed above the servo's" in warning and "of 6.0 rad/s" in warning for warning in warnings)
 
 
+def test_commands_for_elastic_servos_lie_beside_the_plan_with_the_table_of_their_passes(cli, tmp_path):
+    words = ("walk", "poppy12", "--steps", 1, "--compensate", "swing", "--passes", 3, "--stiffness", 60)
+    told = cli(*words, "--no-plots", "-o", "out", "--json").data
+    plan = sk.load_trajectory(tmp_path / "out" / "trajectory.npz")
+    made = sk.load_trajectory(tmp_path / "out" / "compensated" / "trajectory.npz")
+    assert told["trajectory_sha256"] == plan.sha256
+    assert "compensation" not in plan.meta
+    assert told["compensation"]["trajectory_sha256"] == made.sha256
+    assert made.meta["compensation"]["stiffness"] == dict.fromkeys(plan.joint_names, 60.0)
+    rows = told["compensation"]["convergence"]
+    assert [row["passes"] for row in rows] == [0, 1, 2, 3]
+    assert rows[1]["removed"] > 0.9
+    assert rows[3]["norm_mm"] < 1e-2
+    again = cli(*made.meta["command"].split()[1:], "--no-plots", "-o", "again", "--json").data
+    assert again["compensation"]["trajectory_sha256"] == made.sha256
+    balance = [
+        cli("zmp", path, "--json").data["min_margin_mm"]
+        for path in ("out/trajectory.npz", "out/compensated/trajectory.npz")
+    ]
+    assert balance[0] == pytest.approx(balance[1], abs=1e-6)
+
+
+def test_what_is_left_after_every_pass_is_printed_where_statics_lead(cli):
+    words = ("walk", "poppy12", "--steps", 1, "--no-plots", "--compensate")
+    assert "95." in cli(*words, "swing").out
+    assert "nothing static to converge to" in cli(*words, "dynamic").out
+
+
 @pytest.mark.parametrize(
     ("words", "code", "named"),
     [
@@ -119,6 +147,25 @@ def test_joints_faster_than_their_servos_are_a_warning(cli):
         (["bioloid", "--set", "waist_height=0.2"], 3, "_leg, sample 0 (t = 0.000 s): out of reach by"),
         (["bioloid", "--set", "stride=0.5"], 3, "out of reach by"),
         (["linkages/four-bar"], 2, "fixed base"),
+        (["poppy12", "--com", "torso"], 2, "Valid: true, waist"),
+        (["poppy12", "--set", "horizon=0.5"], 2, "shorter than a step"),
+        (["poppy12", "--set", "spread=-0.03"], 3, "overlap"),
+        (["poppy12", "--compensate", "feet"], 2, "unknown compensation 'feet'; valid: swing, joint, dynamic"),
+        (
+            ["poppy12", "--compensate", "joint", "--passes", "0"],
+            2,
+            "--passes is 0; it must be",
+        ),
+        (
+            ["poppy12", "--compensate", "joint", "--stiffness", "0"],
+            2,
+            "stiffness is 0.0; it must be",
+        ),
+        (["poppy12", "--compensate", "joint", "-k", "-60"], 2, "stiffness is -60.0; it must be"),
+        (["poppy12", "--compensate", "swing", "-k", "3"], 3, "the joints are too soft"),
+        (["bioloid", "--compensate", "joint"], 2, "bioloid has no joint stiffness; give one in N m/rad"),
+        (["poppy12", "--passes", "2"], 2, "--passes is of a compensation; add --compensate swing, joint"),
+        (["poppy12", "--stiffness", "60"], 2, "--stiffness is of a compensation"),
     ],
 )
 def test_what_cannot_be_walked_is_told_once_and_leaves_no_file(cli, refused, tmp_path, words, code, named):

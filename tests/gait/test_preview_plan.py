@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 import screwkin as sk
-from screwkin.errors import GaitError, InputError
+from screwkin.errors import GaitError, InputError, NoSolutionError
 from screwkin.gait.footsteps import footholds
 from screwkin.gait.plan import plan
 from screwkin.gait.preview import follow_reference, preview_gains
 from screwkin.gait.preview_plan import preview_plan, zmp_reference
 from screwkin.gait.realise import stance_of
+from screwkin.model.library import find_robot
+from screwkin.model.table import parse_robot
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +43,7 @@ def test_fifteen_phases_of_a_second_are_750_samples(robot: sk.Robot, gait: sk.Ga
         [False, True],
     ]
     start, end = made.T_world_base[[0, -1], 0, 3]
-    assert end - start == pytest.approx(12 * 0.06, abs=2e-3)
+    assert end - start == pytest.approx(0.68, abs=2e-3)
 
 
 def test_the_reference_ramps_between_soles_and_rests_in_the_middle(robot: sk.Robot, gait: sk.Gait) -> None:
@@ -54,7 +56,7 @@ def test_the_reference_ramps_between_soles_and_rests_in_the_middle(robot: sk.Rob
     assert side[105] == pytest.approx(0.0, abs=1e-12)
     assert side[110:150] == pytest.approx(0.048)
     assert reference[700:710, 1] == pytest.approx(np.linspace(side[699], 0, 11)[:10])
-    assert reference[110:150, 0] == pytest.approx(0.06)
+    assert reference[110:150, 0] == pytest.approx(0.68 / 12)
 
 
 def test_the_com_of_all_links_follows_the_cart_with_rates_and_accelerations(
@@ -71,11 +73,33 @@ def test_the_com_of_all_links_follows_the_cart_with_rates_and_accelerations(
     np.testing.assert_allclose(force / robot.mass, cart.acceleration, atol=1e-8)
 
 
-def test_the_true_com_keeps_the_zmp_deeper_in_the_soles_than_the_naive_plan(
+def test_the_naive_plan_leaves_the_soles_in_single_support_where_the_true_com_keeps_well_inside(
     robot: sk.Robot, gait: sk.Gait, walked: sk.Trajectory
 ) -> None:
-    naive = sk.walk(robot, gait.replace(com="waist"), steps=3)
-    assert sk.zmp(robot, naive).margin.min() < 0.5 * sk.zmp(robot, walked).margin.min()
+    """At the gait's own numbers, and at those of the paper: steps of 6 cm, waist at 0.43 m, lift of 5 cm."""
+    assert sk.zmp(robot, walked).margin.min() > 0.015
+    for change in ({}, {"stride": 0.12, "waist_height": 0.43, "lift": 0.05}):
+        naive = sk.walk(robot, gait.replace(com="waist", **change))
+        outside = sk.zmp(robot, naive).margin < -1e-3
+        assert outside.mean() > 0.1
+        assert not outside[naive.contact.all(axis=1)].any()
+
+
+def test_the_face_of_the_foot_that_bears_decides_whether_the_naive_plan_keeps_inside(gait: sk.Gait) -> None:
+    """The whole outline of table 3, 63 mm wide, would hold its ZMP; 50 mm do not. Nothing else changes."""
+    table = find_robot("poppy12").read_text(encoding="utf-8")
+    whole = parse_robot(table.replace('sole_edge = "6.5*mm"', "sole_edge = 0.0"))
+    naive = sk.walk(whole, gait.replace(com="waist"))
+    least = sk.zmp(whole, naive).margin.min()
+    narrower = sk.zmp(sk.load_robot("poppy12"), naive).margin.min()
+    assert 0.003 < least < 0.006
+    assert narrower == pytest.approx(least - 0.0065, abs=1e-9)
+
+
+def test_feet_may_not_overlap_even_where_their_soles_do_not(robot: sk.Robot, gait: sk.Gait) -> None:
+    """Feet of 63 mm touch 31.5 mm from the middle; what bears is 50 mm wide."""
+    with pytest.raises(NoSolutionError, match=r"left_foot and right_foot overlap .* by up to 1\.0 mm"):
+        sk.walk(robot, gait.replace(spread=0.031 - 0.048))
 
 
 def test_another_robot_with_arms_walks_by_preview_too() -> None:
@@ -87,7 +111,7 @@ def test_another_robot_with_arms_walks_by_preview_too() -> None:
 
 
 def test_feet_side_by_side_at_the_start_and_at_the_end(robot: sk.Robot, gait: sk.Gait) -> None:
-    holds = footholds(gait, stance_of(robot), 3)
+    holds = footholds(gait.replace(stride=0.12), stance_of(robot), 3)
     assert [hold.x for hold in holds] == pytest.approx([0, 0, 0.06, 0.12, 0.12])
 
 

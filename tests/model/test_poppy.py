@@ -86,11 +86,17 @@ def test_masses_are_table_2(robot):
     assert masses == {f"{side}_{part}": mass for side in SIDES for part, mass in parts.items()}
 
 
-def test_soles_have_the_size_of_table_3_and_stand_below_the_ankles(robot):
-    for sole, y in zip(robot.soles, (0.048, -0.048), strict=True):
+def test_feet_have_the_size_of_table_3_and_bear_below_the_ankles_on_a_face_inside_it(robot):
+    """The face is as wide as Poppy's own foot, 50 mm; the contact box of the simulation has the same."""
+    for side, sole, y in zip(SIDES, robot.soles, (0.048, -0.048), strict=True):
+        boxes = robot.link(f"{side}_foot_link").boxes
+        sizes = np.array([as_array(box.size) for box in boxes])
+        np.testing.assert_allclose(sizes.max(axis=0)[:2], [0.129, 0.063], atol=1e-15)
         corners = np.array([as_array(corner) for corner in sole.corners])
-        np.testing.assert_allclose(np.ptp(corners, axis=0), [0.129, 0.063, 0], atol=1e-15)
+        np.testing.assert_allclose(np.ptp(corners, axis=0), [0.116, 0.050, 0], atol=1e-15)
         np.testing.assert_allclose(corners.mean(axis=0), [0, y, -0.437], atol=1e-15)
+        bottoms = np.array([as_array(box.center)[2] - as_array(box.size)[2] / 2 for box in boxes])
+        np.testing.assert_allclose(sizes[bottoms.argmin(), :2], [0.116, 0.050], atol=1e-15)
 
 
 def bent(height: float) -> list[float]:

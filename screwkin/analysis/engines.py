@@ -1,0 +1,71 @@
+"""In what a trajectory is simulated: the engine, and what gives way in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from screwkin.dynamics.springs import joint_stiffness
+from screwkin.errors import InputError, UnknownNameError
+from screwkin.gait.compensation import stiffness_of
+from screwkin.model.robot import Robot
+from screwkin.sim.backend import Backend
+from screwkin.sim.compliant import STEP, Compliance, CompliantBackend
+from screwkin.sim.kinematic import KinematicBackend
+from screwkin.sim.pybullet import Physics, PyBulletBackend
+from screwkin.trajectory import Trajectory
+
+Engine = Literal["pybullet", "kinematic"]
+ENGINES: tuple[Engine, ...] = ("pybullet", "kinematic")
+
+
+@dataclass(frozen=True)
+class Yielding:
+    """What gives way in a simulation; nothing by default.
+
+    servos: springs for servos, None for rigid ones; a stiffness of None is the one that the trajectory is
+    compensated for, else the table's. sole_stiffness: of every point of contact [N/m], None for rigid soles.
+    repeat: play the trajectory under other frictions and time steps too, as contact is chaotic on springs.
+    """
+
+    servos: Compliance | None = None
+    sole_stiffness: float | None = None
+    repeat: bool = False
+
+    def __post_init__(self) -> None:
+        if self.repeat and self.servos is None:
+            raise InputError(
+                "only walks on elastic servos are repeated under other conditions; let them yield"
+            )
+
+    def for_trajectory(self, robot: Robot, trajectory: Trajectory) -> Yielding:
+        """The same with the stiffness of every joint by its name.
+
+        Raises:
+            InputError, UnknownNameError: a joint's stiffness is missing, or no positive number.
+        """
+        if self.servos is None:
+            return self
+        chosen = self.servos.stiffness
+        k = joint_stiffness(robot, stiffness_of(trajectory) if chosen is None else chosen).tolist()
+        by_name = dict(zip(robot.joint_names, k, strict=True))
+        return replace(self, servos=replace(self.servos, stiffness=by_name))
+
+
+def opened(robot: Robot, engine: Engine, gives: Yielding, gui: bool) -> Backend:
+    """The simulator of that name, with the robot in it.
+
+    Raises:
+        UnknownNameError: no such engine. InputError: nothing can yield so in it.
+        MissingDependencyError: it is not installed.
+    """
+    if engine not in ENGINES:
+        raise UnknownNameError("engine", engine, ENGINES)
+    soles = gives.sole_stiffness
+    if engine == "kinematic":
+        if gives.servos is not None or soles is not None:
+            raise InputError("engine kinematic knows no forces, so nothing yields in it; use pybullet")
+        return KinematicBackend(robot)
+    if gives.servos is not None:
+        return CompliantBackend(robot, gives.servos, Physics(dt=STEP, sole_stiffness=soles), gui)
+    return PyBulletBackend(robot, Physics(sole_stiffness=soles), gui)
