@@ -140,7 +140,7 @@ class Player:
         self._began = bus.clock.now()
         self._due = 0.0
         self._queue = deque(range(len(self.bounds.ids)))
-        self._adapter = 1e-3
+        self._blocks = [block_of(profile) for profile in self.bounds.profiles]
 
     def play(self, trajectory: Trajectory) -> Outcome:
         """Play the trajectory, and leave the servos as the settings tell.
@@ -236,7 +236,7 @@ class Player:
         self._stream(rest, None)
 
     def _torque_is_read(self) -> bool:
-        return all("torque_limit" in block_of(profile)[2] for profile in self.bounds.profiles)
+        return all("torque_limit" in names for _, _, names in self._blocks)
 
     def _approach(self, start: Array, goal: Array) -> Array:
         """Goals of the soft start: minimum jerk, no joint above the start speed."""
@@ -302,7 +302,7 @@ class Player:
         self._queue.extendleft(reversed(again))
 
     def _read_group(self, goal: Array) -> None:
-        start, length, _ = block_of(self.bounds.profiles[0])
+        start, length, _ = self._blocks[0]
         count = max(1, budget(self.bounds.profiles, self.bus.baud).reads(self.settings.rate))
         chosen = [self._queue[i] for i in range(min(count, len(self._queue)))]
         self._queue.rotate(-len(chosen))
@@ -334,13 +334,13 @@ class Player:
         self.watch.tracked(k, values, float(goal[k]), time)
 
     def _ask(self, k: int) -> Reply:
-        start, length, _ = block_of(self.bounds.profiles[k])
+        start, length, _ = self._blocks[k]
         return self.bus.read(self.bounds.ids[k], start, length)
 
     def _values(self, k: int, reply: Reply) -> dict[str, float]:
         """What a servo's block tells, in SI; the torque registers as they are."""
         profile = self.bounds.profiles[k]
-        start, _, names = block_of(profile)
+        start, _, names = self._blocks[k]
         raw = {name: _register(profile, name, reply.data, start) for name in names}
         values = {
             name.removeprefix("present_"): physical(profile, name, number)
