@@ -200,8 +200,8 @@ class Player:
                 values = self._values(k, reply)
                 pose[k] = values["position"]
                 self.watch.seen(k, values, reply.errors, 0.0)
-            except LineLostError:
-                raise
+            except LineLostError as error:
+                raise SafetyError(f"the servos cannot be asked, at {name} (servo {id}): {error}") from None
             except BusError as error:
                 reasons.append(f"{name}: {error}")
             except FaultFound as found:
@@ -254,9 +254,9 @@ class Player:
             if self._stop():
                 self._come_to_rest(q, i, times)
             late = clock.now() - self._due
+            self.gate.goals(goal, period)
             self._frames += 1
             self._late += late > self.settings.tolerance
-            self.gate.goals(goal, period)
             self.log.frame(
                 self._due - self._began,
                 late + self._due - self._began,
