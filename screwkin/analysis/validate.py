@@ -86,6 +86,7 @@ def validate(
     camera: Camera | None = None,
     criteria: Criteria | None = None,
     progress: Callable[[float], None] | None = None,
+    motion: Trajectory | None = None,
 ) -> Validation:
     """Play the trajectory in a simulator and judge what happened.
 
@@ -97,6 +98,7 @@ def validate(
         camera: take its pictures of what happens; they need neither display nor simulator.
         criteria: what a walk must keep to.
         progress: called now and then with the share done.
+        motion: what the joints do instead, as of servos that were measured; judged against the trajectory.
 
     Raises:
         InputError: unknown engine, or a trajectory of another robot.
@@ -108,7 +110,7 @@ def validate(
     rule = criteria or Criteria()
     backend = _opened(robot, engine, gui)
     try:
-        run = simulate(robot, trajectory, backend, rule.schedule, progress)
+        run = simulate(robot, motion or trajectory, backend, rule.schedule, progress)
     finally:
         backend.close()
     taken = film(robot, trajectory, run, camera) if camera else ()

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from screwkin.analysis.validate import ENGINES, Engine, Validation
+from screwkin.analysis.validate import ENGINES, Criteria, Engine, Validation
 from screwkin.analysis.validate import validate as validated
 from screwkin.cli.output import plain, progress_bar
 from screwkin.errors import UnknownNameError
 from screwkin.files import atomic_write
 from screwkin.report.account import Account
 from screwkin.report.page import write_page
-from screwkin.report.pictures import save_pictures
+from screwkin.report.pictures import Saved, save_pictures
 from screwkin.sim.camera import Camera, save_gif
+from screwkin.trajectory import Trajectory
 
 PICTURES_PER_SECOND = 6.0
 FEWEST, MOST = 30, 120
@@ -25,13 +26,20 @@ FEWEST, MOST = 30, 120
 
 @dataclass(frozen=True)
 class Wish:
-    """What a simulation is to be: engine, a window, a film, pictures and page; commands for the page."""
+    """What a simulation is to be: engine, a window, a film, pictures and page; commands for the page.
+
+    motion: what the joints do instead of the trajectory; criteria: what a walk must keep to; more: draws
+    further pictures once the verdict is written.
+    """
 
     engine: str = "pybullet"
     gui: bool = False
     video: bool = False
     plots: bool = True
     commands: Sequence[str] = ()
+    motion: Trajectory | None = None
+    criteria: Criteria | None = None
+    more: Callable[[Validation], Sequence[Saved]] = lambda check: ()
 
 
 def simulate(account: Account, folder: Path, verdict: Path, wish: Wish) -> Validation:
@@ -51,17 +59,25 @@ def simulate(account: Account, folder: Path, verdict: Path, wish: Wish) -> Valid
     camera = _camera(trajectory.duration) if wish.video else None
     with progress_bar("simulation") as done:
         check = validated(
-            account.robot, trajectory, engine(wish.engine), gui=wish.gui, camera=camera, progress=done
+            account.robot,
+            trajectory,
+            engine(wish.engine),
+            gui=wish.gui,
+            camera=camera,
+            criteria=wish.criteria,
+            progress=done,
+            motion=wish.motion,
         )
     with atomic_write(verdict) as file:
         file.write(json.dumps(plain(check.to_dict()), indent=2, allow_nan=False) + "\n")
     film = None
     if camera is not None and check.pictures:
         film = save_gif(folder / "walk.gif", check.pictures, trajectory.duration / (camera.pictures - 1))
+    more = wish.more(check)
     if wish.plots:
         with progress_bar("pictures") as done:
             pictures = save_pictures(account, folder, check, done)
-        write_page(folder / "report.html", account, pictures, check, film, wish.commands)
+        write_page(folder / "report.html", account, [*pictures, *more], check, film, wish.commands)
     return check
 
 

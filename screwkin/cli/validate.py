@@ -12,6 +12,7 @@ from screwkin.analysis.validate import Validation
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, TrajectoryPath
 from screwkin.cli.output import aligned, print_json, remark
+from screwkin.cli.replay import replay
 from screwkin.cli.simulation import Wish, simulate
 from screwkin.cli.simulation import engine as engine_named
 from screwkin.errors import OutputError
@@ -29,14 +30,21 @@ def validate(
     gui: Annotated[bool, typer.Option("--gui", help="Show a window, at the robot's own speed.")] = False,
     video: Annotated[bool, typer.Option("--video", help="Film it: walk.gif.")] = False,
     plots: Annotated[bool, typer.Option(help="Draw the pictures and write the report.")] = True,
+    log: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Replay what servos did: the play.npz of a send of it."),
+    ] = None,
     output: OutputFolder = None,
     as_json: AsJson = False,
 ) -> int:
     """Simulate a trajectory and give a verdict: validation.json beside it, plots, report.html.
 
-    Without -o all files go beside the trajectory. Exit code 3 if it does not pass; the reasons are told.
+    Without -o all files go beside the trajectory, with --log into replay/ beside the log. Exit code 3 if it
+    does not pass; the reasons are told.
     """
     engine_named(engine)
+    if log is not None:
+        return replay(trajectory, log, Wish(engine, gui, video, plots), output, as_json)
     loaded = load_trajectory(trajectory)
     account = account_of(recorded_robot(loaded, str(trajectory)), loaded)
     beside = _beside(trajectory)

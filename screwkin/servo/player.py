@@ -329,7 +329,7 @@ class Player:
 
     def _take(self, k: int, reply: Reply, goal: Array) -> None:
         values, time = self._values(k, reply), self._time()
-        self.log.measured(k, values)
+        self.log.measured(k, values, time)
         self.watch.seen(k, values, reply.errors, time)
         self.watch.tracked(k, values, float(goal[k]), time)
 
