@@ -12,7 +12,7 @@ from screwkin.analysis.replay import replayed
 from screwkin.analysis.validate import Criteria, Validation
 from screwkin.cli.folder import output_folder
 from screwkin.cli.output import aligned, print_json, remark
-from screwkin.cli.simulation import Wish, simulate
+from screwkin.cli.simulation import Wish, print_verdict, simulate
 from screwkin.report.account import account_of, recorded_robot
 from screwkin.report.numbers import validation_numbers
 from screwkin.report.pictures import save_servo_pictures
@@ -63,8 +63,6 @@ def replay(trajectory: Path, log: Path, wish: Wish, output: Path | None, as_json
 
 
 def _tell(check: Validation, facts: dict[str, object], folder: Path) -> None:
-    from screwkin.cli.validate import print_verdict
-
     print(
         f"{facts['log']}: joints as measured, {facts['replayed_s']:.2f} s in {check.engine}; up to "
         f"{facts['max_deviation_deg']:.1f} deg from the plan"

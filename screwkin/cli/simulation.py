@@ -11,7 +11,7 @@ import numpy as np
 
 from screwkin.analysis.validate import ENGINES, Criteria, Engine, Validation
 from screwkin.analysis.validate import validate as validated
-from screwkin.cli.output import plain, progress_bar
+from screwkin.cli.output import plain, progress_bar, remark
 from screwkin.errors import UnknownNameError
 from screwkin.files import atomic_write
 from screwkin.report.account import Account
@@ -79,6 +79,15 @@ def simulate(account: Account, folder: Path, verdict: Path, wish: Wish) -> Valid
             pictures = save_pictures(account, folder, check, done)
         write_page(folder / "report.html", account, [*pictures, *more], check, film, wish.commands)
     return check
+
+
+def print_verdict(check: Validation) -> None:
+    """Passed, or not with every reason; warnings on stderr."""
+    print("passed" if check.passed else "NOT passed:")
+    for reason in check.reasons:
+        print(f"  {reason}")
+    for warning in check.warnings:
+        remark(f"warning: {warning}")
 
 
 def engine(name: str) -> Engine:

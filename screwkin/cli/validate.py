@@ -8,12 +8,11 @@ from typing import Annotated
 
 import typer
 
-from screwkin.analysis.validate import Validation
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, TrajectoryPath
-from screwkin.cli.output import aligned, print_json, remark
+from screwkin.cli.output import aligned, print_json
 from screwkin.cli.replay import replay
-from screwkin.cli.simulation import Wish, simulate
+from screwkin.cli.simulation import Wish, print_verdict, simulate
 from screwkin.cli.simulation import engine as engine_named
 from screwkin.errors import OutputError
 from screwkin.files import make_folder
@@ -76,15 +75,6 @@ def _beside(trajectory: Path) -> Path:
         raise OutputError(
             f"validation.json belongs beside {trajectory}: {why} Copy the trajectory to a folder of yours."
         ) from None
-
-
-def print_verdict(check: Validation) -> None:
-    """Passed, or not with every reason; warnings on stderr."""
-    print("passed" if check.passed else "NOT passed:")
-    for reason in check.reasons:
-        print(f"  {reason}")
-    for warning in check.warnings:
-        remark(f"warning: {warning}")
 
 
 def _commands(made: str, trajectory: str, engine: str, video: bool) -> list[str]:
