@@ -18,6 +18,7 @@ import functools
 import io
 import json
 import math
+import multiprocessing
 import os
 import re
 import signal
@@ -331,7 +332,8 @@ def campaign(seeds: Sequence[int], folder: Path, lasts: float, jobs: int = 1) ->
     one = functools.partial(played, folder=folder)
     if jobs == 1:
         return list(map(one, plans))
-    with ProcessPoolExecutor(jobs) as pool:
+    # Fresh processes: a fork of one that runs threads may lock up.
+    with ProcessPoolExecutor(jobs, multiprocessing.get_context("spawn")) as pool:
         return list(pool.map(one, plans, chunksize=4))
 
 
