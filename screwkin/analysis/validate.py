@@ -96,6 +96,7 @@ def validate(
     criteria: Criteria | None = None,
     gives: Yielding | None = None,
     progress: Callable[[float], None] | None = None,
+    motion: Trajectory | None = None,
 ) -> Validation:
     """Play the trajectory in a simulator and judge what happened.
 
@@ -108,6 +109,7 @@ def validate(
         criteria: what a walk must keep to.
         gives: what yields; by default nothing does. In repeated runs the robot may not fall either.
         progress: called now and then with the share done.
+        motion: what the joints do instead, as of servos that were measured; judged against the trajectory.
 
     Raises:
         InputError: unknown engine, a trajectory of another robot, or nothing that can yield so.
@@ -119,7 +121,7 @@ def validate(
     first = 0.2 if gives.repeat else 1.0
     backend = opened(robot, engine, gives, gui)
     try:
-        run = simulate(robot, trajectory, backend, rule.schedule, lambda share: told(first * share))
+        run = simulate(robot, motion or trajectory, backend, rule.schedule, lambda share: told(first * share))
     finally:
         backend.close()
     taken = film(robot, trajectory, run, camera) if camera else ()

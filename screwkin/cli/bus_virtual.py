@@ -13,6 +13,7 @@ import typer
 
 from screwkin.cli.options import AsJson, RobotName
 from screwkin.cli.output import print_json, remark, silent
+from screwkin.cli.troubles import Seed, Troubles, troubles_of
 from screwkin.errors import InputError, OutputError
 from screwkin.model.table import load_robot
 from screwkin.servo.line import MonotonicClock
@@ -20,7 +21,6 @@ from screwkin.servo.servo_map import ServoMap
 from screwkin.servo.virtual import virtual_servos
 from screwkin.servo.virtual_bus import VirtualBus
 from screwkin.servo.virtual_terminal import PseudoTerminal
-from screwkin.servo.virtual_trouble import KINDS, Trouble
 
 
 def virtual(
@@ -33,14 +33,8 @@ def virtual(
         float | None, typer.Option(help="Of every joint [N m/rad]; default: the table's, or rigid.")
     ] = None,
     return_delay: Annotated[float, typer.Option(help="From command to answer [microseconds].")] = 500.0,
-    trouble: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="KIND@FROM[-TO][:ID]",
-            help=f"What goes wrong, in seconds from the start, as dropped@3-4:12. Kinds: {', '.join(KINDS)}.",
-        ),
-    ] = None,
-    seed: Annotated[int, typer.Option(help="Of what is random in troubles.")] = 0,
+    trouble: Troubles = None,
+    seed: Seed = 0,
     seconds: Annotated[
         float | None, typer.Option(help="End after this time; default: when interrupted.")
     ] = None,
@@ -54,8 +48,7 @@ def virtual(
     q = None if posture is None else table.posture(posture).q
     servos = virtual_servos(table, q, stiffness, 1e-6 * return_delay)
     start = clock.now()
-    troubles = [_trouble(text, start) for text in trouble or ()]
-    bus = VirtualBus(servos, clock, mapped.baud, troubles, seed)
+    bus = VirtualBus(servos, clock, mapped.baud, troubles_of(trouble, start), seed)
     with PseudoTerminal(bus) as terminal, _linked(link, terminal.path) as port:
         told = {"port": port, "robot": table.name, "servos": len(servos), "protocol": mapped.protocol}
         if as_json:
@@ -75,30 +68,6 @@ def _wait(terminal: PseudoTerminal, end: float | None) -> None:
             time.sleep(0.05 if end is None else min(0.05, max(0.0, end - time.monotonic())))
     except KeyboardInterrupt:
         remark("")
-
-
-def _trouble(text: str, start: float) -> Trouble:
-    """A trouble told as ``KIND@FROM[-TO][:ID]``.
-
-    Raises:
-        InputError: it is not told so.
-    """
-    head, _, told_id = text.partition(":")
-    kind, at, times = head.partition("@")
-    begin, dash, end = times.partition("-")
-    try:
-        first = float(begin) if at else 0.0
-        last = float(end) if dash else math.inf
-        id = int(told_id) if told_id else None
-    except ValueError:
-        raise InputError(
-            f"--trouble {text!r} is not understood; write KIND@FROM-TO:ID, as dropped@3-4:12"
-        ) from None
-    if kind not in KINDS:
-        raise InputError(f"--trouble {text!r}: unknown kind {kind!r}; valid: {', '.join(KINDS)}")
-    if not (0 <= first <= last and math.isfinite(first)):
-        raise InputError(f"--trouble {text!r}: needs 0 <= FROM <= TO, in seconds")
-    return Trouble(kind, start + first, start + last, id)
 
 
 @contextmanager

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
@@ -15,14 +15,17 @@ from screwkin.analysis.readiness import Ready, ready
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, TrajectoryPath
 from screwkin.cli.output import print_json, progress_bar, remark
+from screwkin.cli.troubles import Seed, Troubles, troubles_of
 from screwkin.errors import InputError, UnknownNameError
-from screwkin.servo.budget import budget
+from screwkin.model.robot import Robot
+from screwkin.servo.budget import ADAPTER, budget
 from screwkin.servo.bus import Bus, open_line
 from screwkin.servo.gate import Bounds
 from screwkin.servo.player import Frames, Outcome, Player, PlaySettings, State, describe, frames_of
 from screwkin.servo.servo_map import ServoMap
 from screwkin.servo.virtual import virtual_servos
 from screwkin.servo.virtual_bus import SimulatedClock, VirtualBus
+from screwkin.servo.virtual_trouble import Trouble
 
 _STATES: tuple[State, ...] = ("hold", "limp")
 _INTERRUPTED = 130
@@ -42,18 +45,23 @@ def send(
     on_fault: Annotated[str, typer.Option(help="After a fault: hold or limp.")] = "hold",
     at_end: Annotated[str, typer.Option(help="After the last frame: hold or limp.")] = "hold",
     rs485: Annotated[bool, typer.Option("--rs485", help="Let the kernel switch direction.")] = False,
+    trouble: Troubles = None,
+    seed: Seed = 0,
     output: OutputFolder = None,
     as_json: AsJson = False,
 ) -> int:
     """Play a validated trajectory to the servos: a dry run that opens nothing, unless --go.
 
-    Writes play.npz, a log of commands and measurements. Exit code 4 where the trajectory is refused, or a
-    fault stopped it; 130 where it was interrupted.
+    Writes play.npz, a log of commands and measurements. With --virtual all is done in simulated time. Exit
+    code 4 where the trajectory is refused, or a fault stopped it; 130 where it was interrupted.
     """
     if port and virtual:
         raise InputError("--port and --virtual are two buses; give one of them")
     if go and not (port or virtual):
         raise InputError("--go needs a bus: --port /dev/ttyUSB0, or --virtual")
+    if trouble and not virtual:
+        raise InputError("--trouble is for virtual servos; give --virtual with it")
+    troubles = troubles_of(trouble)
     may = ready(trajectory, robot or None)
     settings = PlaySettings(
         rate=rate, torque=torque, far=_distance(far), on_fault=_state(on_fault), at_end=_state(at_end)
@@ -76,23 +84,26 @@ def send(
         _tell_dry(trajectory, frames, bounds, facts, as_json)
         return 0
     with output_folder(output, "send", may.robot.name) as folder:
-        outcome = _played(may, settings, servos, port, rs485, folder / "play.npz")
+        bus = _real_bus(servos, port, rs485) if port else virtual_bus(may.robot, troubles, seed)
+        outcome = played(bus, may, settings, folder / "play.npz", {"port": port or "virtual"})
     return _tell(outcome, facts | {"log": str(folder / "play.npz")}, bounds, as_json)
 
 
-def _played(
-    may: Ready, settings: PlaySettings, servos: ServoMap, port: str, rs485: bool, log: Path
-) -> Outcome:
-    """Play on the real or the virtual bus, and save the log whatever happens."""
-    if port:
-        bus = Bus(open_line(port, servos.baud, rs485), servos.protocol, servos.baud)
-    else:
-        bus = _virtual_bus(may, servos)
+def played(bus: Bus, may: Ready, settings: PlaySettings, log: Path, told: Mapping[str, Any]) -> Outcome:
+    """Play on a bus, close it, and save the log whatever happens once the servos move.
+
+    Args:
+        bus: open.
+        may: what to play.
+        settings: how.
+        log: path of its file.
+        told: what its ``meta`` holds besides.
+    """
     meta = {
         "robot": may.robot.name,
         "trajectory_sha256": may.trajectory.sha256,
-        "port": port or "virtual",
         "rate": settings.rate,
+        **told,
     }
     with _stop_on_signal() as stopped, progress_bar("playing") as done:
         player = Player(bus, may.robot, settings, stopped, done)
@@ -102,14 +113,19 @@ def _played(
             return outcome
         finally:
             bus.close()
-            if player.log.frames:
+            if player.log.frames or "faults" in meta:
                 player.log.save(log, meta)
 
 
-def _virtual_bus(may: Ready, servos: ServoMap) -> Bus:
+def _real_bus(servos: ServoMap, port: str, rs485: bool) -> Bus:
+    return Bus(open_line(port, servos.baud, rs485), servos.protocol, servos.baud)
+
+
+def virtual_bus(robot: Robot, troubles: Sequence[Trouble] = (), seed: int = 0) -> Bus:
     """Virtual servos of the robot in its posture ``home``, or at zero, on a simulated clock."""
-    clock = SimulatedClock()
-    line = VirtualBus(virtual_servos(may.robot, return_delay=_RETURN_DELAY), clock, servos.baud)
+    servos, clock = ServoMap.of(robot), SimulatedClock()
+    made = virtual_servos(robot, return_delay=_RETURN_DELAY)
+    line = VirtualBus(made, clock, servos.baud, troubles, seed, adapter=ADAPTER)
     return Bus(line, servos.protocol, servos.baud, clock)
 
 

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from screwkin.analysis.engines import ENGINES, Engine, Yielding
-from screwkin.analysis.validate import Validation
+from screwkin.analysis.validate import Criteria, Validation
 from screwkin.analysis.validate import validate as validated
-from screwkin.cli.output import plain, progress_bar
+from screwkin.cli.output import plain, progress_bar, remark
 from screwkin.errors import UnknownNameError
 from screwkin.files import atomic_write
 from screwkin.report.account import Account
 from screwkin.report.page import write_page
-from screwkin.report.pictures import save_pictures
+from screwkin.report.pictures import Saved, save_pictures
 from screwkin.sim.camera import Camera, save_gif
+from screwkin.trajectory import Trajectory
 
 PICTURES_PER_SECOND = 6.0
 FEWEST, MOST = 30, 120
@@ -28,7 +29,8 @@ FEWEST, MOST = 30, 120
 class Wish:
     """What a simulation is to be: engine, a window, a film, pictures and page; commands for the page.
 
-    gives: what yields; see ``validate``.
+    gives: what yields; see ``validate``. motion: what the joints do instead of the trajectory; criteria: what
+    a walk must keep to; more: draws further pictures once the verdict is written.
     """
 
     engine: str = "pybullet"
@@ -37,6 +39,9 @@ class Wish:
     plots: bool = True
     commands: Sequence[str] = ()
     gives: Yielding = field(default_factory=Yielding)
+    motion: Trajectory | None = None
+    criteria: Criteria | None = None
+    more: Callable[[Validation], Sequence[Saved]] = lambda check: ()
 
 
 def simulate(account: Account, folder: Path, verdict: Path, wish: Wish) -> Validation:
@@ -61,19 +66,31 @@ def simulate(account: Account, folder: Path, verdict: Path, wish: Wish) -> Valid
             engine(wish.engine),
             gui=wish.gui,
             camera=camera,
+            criteria=wish.criteria,
             gives=wish.gives,
             progress=done,
+            motion=wish.motion,
         )
     with atomic_write(verdict) as file:
         file.write(json.dumps(plain(check.to_dict()), indent=2, allow_nan=False) + "\n")
     film = None
     if camera is not None and check.pictures:
         film = save_gif(folder / "walk.gif", check.pictures, trajectory.duration / (camera.pictures - 1))
+    more = wish.more(check)
     if wish.plots:
         with progress_bar("pictures") as done:
             pictures = save_pictures(account, folder, check, done)
-        write_page(folder / "report.html", account, pictures, check, film, wish.commands)
+        write_page(folder / "report.html", account, [*pictures, *more], check, film, wish.commands)
     return check
+
+
+def print_verdict(check: Validation) -> None:
+    """Passed, or not with every reason; warnings on stderr."""
+    print("passed" if check.passed else "NOT passed:")
+    for reason in check.reasons:
+        print(f"  {reason}")
+    for warning in check.warnings:
+        remark(f"warning: {warning}")
 
 
 def engine(name: str) -> Engine:

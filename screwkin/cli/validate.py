@@ -10,11 +10,11 @@ from typing import Annotated
 import typer
 
 from screwkin.analysis.engines import Yielding
-from screwkin.analysis.validate import Validation
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, TrajectoryPath
-from screwkin.cli.output import aligned, print_json, remark
-from screwkin.cli.simulation import Wish, simulate
+from screwkin.cli.output import aligned, print_json
+from screwkin.cli.replay import replay
+from screwkin.cli.simulation import Wish, print_verdict, simulate
 from screwkin.cli.simulation import engine as engine_named
 from screwkin.errors import InputError, OutputError
 from screwkin.files import make_folder
@@ -51,15 +51,26 @@ def validate(
         typer.Option("--repeat", help="With --compliant: also under other frictions and time steps."),
     ] = False,
     plots: Annotated[bool, typer.Option(help="Draw the pictures and write the report.")] = True,
+    log: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Replay what servos did: the play.npz of a send of it."),
+    ] = None,
     output: OutputFolder = None,
     as_json: AsJson = False,
 ) -> int:
     """Simulate a trajectory and give a verdict: validation.json beside it, plots, report.html.
 
-    Without -o all files go beside the trajectory. Exit code 3 if it does not pass; the reasons are told.
+    Without -o all files go beside the trajectory, with --log into replay/ beside the log. Exit code 3 if it
+    does not pass; the reasons are told.
     """
     engine_named(engine)
     gives = _yielding(compliant, k, sole_stiffness, repeat)
+    if log is not None:
+        if gives != Yielding():
+            raise InputError(
+                "--log replays servos that moved; it goes without --compliant and --sole-stiffness"
+            )
+        return replay(trajectory, log, Wish(engine, gui, video, plots), output, as_json)
     loaded = load_trajectory(trajectory)
     account = account_of(recorded_robot(loaded, str(trajectory)), loaded)
     gives.for_trajectory(account.robot, loaded)  # refused before anything is written
@@ -88,15 +99,6 @@ def _beside(trajectory: Path) -> Path:
         raise OutputError(
             f"validation.json belongs beside {trajectory}: {why} Copy the trajectory to a folder of yours."
         ) from None
-
-
-def print_verdict(check: Validation) -> None:
-    """Passed, or not with every reason; warnings on stderr."""
-    print("passed" if check.passed else "NOT passed:")
-    for reason in check.reasons:
-        print(f"  {reason}")
-    for warning in check.warnings:
-        remark(f"warning: {warning}")
 
 
 def _yielding(compliant: bool, k: float | None, sole_stiffness: float | None, repeat: bool) -> Yielding:

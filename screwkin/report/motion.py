@@ -93,26 +93,22 @@ def joint_angles(account: Account, kind: str = "leg") -> Figure | None:
     for limb, one in zip(limbs, axes[:, 0], strict=True):
         shade_swings(one, account)
         joints = robot.path_to(limb.link)
-        common = _common_prefix([robot.joints[i].name for i in joints])
+        common = common_prefix([robot.joints[i].name for i in joints])
         for k, i in enumerate(joints):
             revolute = robot.joints[i].type != "prismatic"
             value = np.degrees(trajectory.q[:, i]) if revolute else 1e3 * trajectory.q[:, i]
             name = shown(robot.joints[i].name[len(common) :])
-            one.plot(trajectory.time, value, color=_hue(k), linestyle=LINES[k % 2], label=name)
+            one.plot(trajectory.time, value, color=HUES[k % len(HUES)], linestyle=LINES[k % 2], label=name)
         one.set_ylabel(f"{shown(limb.name)} [deg]")
     time_axis(axes[-1, 0], account)
     legend_above(figure, list(axes[:, 0]), columns=4)
     return figure
 
 
-_HUES = ("#222222", "#56B4E9", "#CC79A7", "#009E73", "#E69F00", "#0072B2")
+HUES = ("#222222", "#56B4E9", "#CC79A7", "#009E73", "#E69F00", "#0072B2")
 
 
-def _hue(k: int) -> str:
-    return _HUES[k % len(_HUES)]
-
-
-def _common_prefix(names: list[str]) -> str:
+def common_prefix(names: list[str]) -> str:
     """What all names begin with, up to an underscore: ``right_`` of right_knee and right_hip."""
     if len(names) < 2:
         return ""

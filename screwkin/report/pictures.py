@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from screwkin.analysis.validate import Validation
-from screwkin.report import balance, frames, motion, simulation
+from screwkin.report import balance, frames, motion, servos, simulation
 from screwkin.report.account import Account
 from screwkin.report.style import Figure, save_figure, styled
+from screwkin.servo.log import PlayLog
 
 
 @dataclass(frozen=True)
@@ -43,6 +44,25 @@ def save_pictures(
         OutputError: a file cannot be written; those before it are complete.
     """
     plots = _of_the_walk(account, check) + (_of_the_simulation(account, check) if check else [])
+    return _saved(plots, folder, progress)
+
+
+def save_servo_pictures(account: Account, folder: Path, log: PlayLog) -> list[Saved]:
+    """Draw and write what servos did, from the log of a play.
+
+    Raises:
+        OutputError: a file cannot be written.
+    """
+    caption = (
+        "What the servos were told (lines) and what they answered (dots), joint by joint of the legs; below, "
+        "how far every joint was from its goal."
+    )
+    return _saved([Plot("tracking", "The servos", caption, lambda: servos.tracking(account, log))], folder)
+
+
+def _saved(
+    plots: list[Plot], folder: Path, progress: Callable[[float], None] = lambda share: None
+) -> list[Saved]:
     saved = []
     for k, plot in enumerate(plots):
         with styled():

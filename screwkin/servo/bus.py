@@ -81,7 +81,7 @@ class _Port:
         except ScrewkinError:
             raise
         except Exception as error:
-            raise LineLostError(f"the port is gone ({error}); is the cable plugged in?") from None
+            raise LineLostError(f"the port is gone ({error}): check the cable") from None
 
 
 class Bus:
@@ -263,7 +263,7 @@ class Bus:
         """Send what nobody answers."""
         result = self._try(act)
         if result not in (self._sdk.COMM_SUCCESS, self._sdk.COMM_NOT_AVAILABLE):
-            raise LineLostError("the port does not take the packet; is the cable plugged in?")
+            raise LineLostError("the port does not take the packet: check the cable")
 
     def _exchange(
         self, id: int, what: str, act: Callable[[], Any], length: int = 0

@@ -113,7 +113,7 @@ class _Reader:
         except BusError as error:
             self.silent += 1
             if self.silent >= _SILENCE:
-                raise LineLostError("no servo answers any more; is the cable plugged in?") from error
+                raise LineLostError("no servo answers any more: check the cable") from error
             return None
         self.silent = 0
         return value

@@ -12,7 +12,7 @@ They share nothing with the makers' driver, so that each tests the other.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Literal
@@ -64,6 +64,43 @@ class Command:
     data: bytes = b""
     answers: bool = True
     after: tuple[int, ...] = ()
+
+
+def sound_packets(
+    buffer: bytes,
+    ended: bool,
+    header: bytes,
+    length: Callable[[bytes, int], int],
+    opened: Callable[[bytes], tuple[Packet, int] | None],
+) -> tuple[list[Packet], bytes]:
+    """The sound packets of a stream, in order, and the rest that may become one with more bytes.
+
+    Where a packet proves false, the search goes on one byte behind its beginning, so that a false header or a
+    lost byte costs no packet that follows. A false length may hold up what follows until so many bytes are
+    there or the line has fallen silent; with ``ended`` nothing is waited for.
+
+    Args:
+        buffer: what has arrived, the rest of last time before it.
+        ended: no more bytes are coming.
+        header: what every packet begins with.
+        length: bytes of the packet whose header stands at an index of the data, as far as they tell it; 0 if
+            none can begin there.
+        opened: the packet that so many bytes are, and how many of them it uses up; None if it is false.
+    """
+    data = bytes(buffer)
+    packets: list[Packet] = []
+    end = 0  # of the last packet, or of what was passed over
+    while (i := data.find(header, end)) >= 0:
+        end = i + 1
+        whole = length(data, i)
+        if i + whole > len(data):
+            if not ended:
+                return packets, data[i:]
+        elif whole and (found := opened(data[i : i + whole])):
+            packets.append(found[0])
+            end = i + found[1]
+    begun = (header[:n] for n in range(len(header) - 1, 0, -1) if data.endswith(header[:n], end))
+    return packets, b"" if ended else next(begun, b"")
 
 
 def simple_command(packet: Packet, address_width: int) -> Command:

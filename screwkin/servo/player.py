@@ -140,7 +140,7 @@ class Player:
         self._began = bus.clock.now()
         self._due = 0.0
         self._queue = deque(range(len(self.bounds.ids)))
-        self._adapter = 1e-3
+        self._blocks = [block_of(profile) for profile in self.bounds.profiles]
 
     def play(self, trajectory: Trajectory) -> Outcome:
         """Play the trajectory, and leave the servos as the settings tell.
@@ -200,8 +200,8 @@ class Player:
                 values = self._values(k, reply)
                 pose[k] = values["position"]
                 self.watch.seen(k, values, reply.errors, 0.0)
-            except LineLostError:
-                raise
+            except LineLostError as error:
+                raise SafetyError(f"the servos cannot be asked, at {name} (servo {id}): {error}") from None
             except BusError as error:
                 reasons.append(f"{name}: {error}")
             except FaultFound as found:
@@ -236,7 +236,7 @@ class Player:
         self._stream(rest, None)
 
     def _torque_is_read(self) -> bool:
-        return all("torque_limit" in block_of(profile)[2] for profile in self.bounds.profiles)
+        return all("torque_limit" in names for _, _, names in self._blocks)
 
     def _approach(self, start: Array, goal: Array) -> Array:
         """Goals of the soft start: minimum jerk, no joint above the start speed."""
@@ -254,9 +254,9 @@ class Player:
             if self._stop():
                 self._come_to_rest(q, i, times)
             late = clock.now() - self._due
+            self.gate.goals(goal, period)
             self._frames += 1
             self._late += late > self.settings.tolerance
-            self.gate.goals(goal, period)
             self.log.frame(
                 self._due - self._began,
                 late + self._due - self._began,
@@ -302,7 +302,7 @@ class Player:
         self._queue.extendleft(reversed(again))
 
     def _read_group(self, goal: Array) -> None:
-        start, length, _ = block_of(self.bounds.profiles[0])
+        start, length, _ = self._blocks[0]
         count = max(1, budget(self.bounds.profiles, self.bus.baud).reads(self.settings.rate))
         chosen = [self._queue[i] for i in range(min(count, len(self._queue)))]
         self._queue.rotate(-len(chosen))
@@ -329,18 +329,18 @@ class Player:
 
     def _take(self, k: int, reply: Reply, goal: Array) -> None:
         values, time = self._values(k, reply), self._time()
-        self.log.measured(k, values)
+        self.log.measured(k, values, time)
         self.watch.seen(k, values, reply.errors, time)
         self.watch.tracked(k, values, float(goal[k]), time)
 
     def _ask(self, k: int) -> Reply:
-        start, length, _ = block_of(self.bounds.profiles[k])
+        start, length, _ = self._blocks[k]
         return self.bus.read(self.bounds.ids[k], start, length)
 
     def _values(self, k: int, reply: Reply) -> dict[str, float]:
         """What a servo's block tells, in SI; the torque registers as they are."""
         profile = self.bounds.profiles[k]
-        start, _, names = block_of(profile)
+        start, _, names = self._blocks[k]
         raw = {name: _register(profile, name, reply.data, start) for name in names}
         values = {
             name.removeprefix("present_"): physical(profile, name, number)

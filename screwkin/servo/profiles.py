@@ -11,7 +11,7 @@ import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, cached_property
 from importlib.resources import files
 from types import MappingProxyType
 from typing import Any, Literal
@@ -48,7 +48,7 @@ class Register:
     initial: int = 0
     sign: Sign = "none"
 
-    @property
+    @cached_property
     def end(self) -> int:
         """The address after its last byte."""
         return self.address + self.width
@@ -83,7 +83,7 @@ class Profile:
     registers: Mapping[str, Register]
     aliases: tuple[str, ...] = field(default=())
 
-    @property
+    @cached_property
     def tick(self) -> float:
         """One tick [rad]."""
         return math.radians(self.range_deg) / self.ticks

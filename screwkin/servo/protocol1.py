@@ -21,6 +21,7 @@ from screwkin.servo.packets import (
     Packet,
     rows,
     simple_command,
+    sound_packets,
     sync_write_command,
     turn,
 )
@@ -47,29 +48,27 @@ def status(id: int, error: int, data: bytes = b"") -> bytes:
 
 
 def parse(buffer: bytes, ended: bool = False) -> tuple[list[Packet], bytes]:
-    """The sound packets of a stream, in order, and the rest that may become one with more bytes.
+    """The sound packets of a stream, and the rest that may become one with more bytes: ``sound_packets``.
 
-    Where a packet proves false, the search goes on one byte behind its beginning, so that a false header or a
-    lost byte costs no packet that follows. A false length may hold up what follows until so many bytes are
-    there (at most 259) or the line has fallen silent; pass ``ended`` then, and nothing is waited for.
+    A false length holds up what follows for at most 259 bytes.
     """
-    data = bytes(buffer)
-    packets: list[Packet] = []
-    end = 0  # of the last packet, or of what was passed over
-    while (i := data.find(_HEADER, end)) >= 0:
-        end = i + 1
-        if data[i + 2 : i + 3] == b"\xff":
-            continue
-        whole = _OVERHEAD + (data[i + 3] if i + 3 < len(data) else _LEAST)
-        if i + whole > len(data):
-            if not ended:
-                return packets, data[i:]
-        elif whole >= _OVERHEAD + _LEAST and data[i + whole - 1] == checksum(data[i + 2 : i + whole - 1]):
-            packets.append(Packet(data[i + 2], data[i + 4], data[i + 5 : i + whole - 1]))
-            # A sum of FF may be the next header's: it always is where one bit made len greater by one.
-            end = i + whole - (data[i + whole - 1] == 0xFF)
-    half = b"\xff" if not ended and len(data) > end and data[-1] == 0xFF else b""
-    return packets, half
+    return sound_packets(buffer, ended, _HEADER, _length, _opened)
+
+
+def _length(data: bytes, i: int) -> int:
+    """Bytes of the packet at an index; 0 if none can begin there."""
+    if data[i + 2 : i + 3] == b"\xff":
+        return 0
+    told = data[i + 3] if i + 3 < len(data) else _LEAST
+    return _OVERHEAD + told if told >= _LEAST else 0
+
+
+def _opened(data: bytes) -> tuple[Packet, int] | None:
+    """The packet, if its sum is right, and the bytes it uses up."""
+    if data[-1] != checksum(data[2:-1]):
+        return None
+    # A sum of FF may be the next header's: it always is where one bit made len greater by one.
+    return Packet(data[2], data[4], data[5:-1]), len(data) - (data[-1] == 0xFF)
 
 
 def command_for(packet: Packet, id: int) -> Command | None:

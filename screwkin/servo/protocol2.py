@@ -24,6 +24,7 @@ from screwkin.servo.packets import (
     Packet,
     rows,
     simple_command,
+    sound_packets,
     sync_write_command,
     turn,
 )
@@ -69,34 +70,27 @@ def status(id: int, error: int, data: bytes = b"") -> bytes:
 
 
 def parse(buffer: bytes, ended: bool = False) -> tuple[list[Packet], bytes]:
-    """The sound packets of a stream, in order, and the rest that may become one with more bytes.
+    """The sound packets of a stream, and the rest that may become one with more bytes: ``sound_packets``.
 
-    Where a packet proves false, the search goes on one byte behind its beginning, so that a false header or a
-    lost byte costs no packet that follows. A false length may hold up what follows until so many bytes are
-    there (at most 1031) or the line has fallen silent; pass ``ended`` then, and nothing is waited for.
+    A false length holds up what follows for at most 1031 bytes.
     """
-    data = bytes(buffer)
-    packets: list[Packet] = []
-    end = 0  # of the last packet, or of what was passed over
-    while (i := data.find(_HEADER, end)) >= 0:
-        end = i + 1
-        length = int.from_bytes(data[i + 5 : i + 7], "little") if i + _OVERHEAD <= len(data) else _LEAST
-        whole = _OVERHEAD + length
-        if not _LEAST <= length <= MOST or data[i + 4 : i + 5] == b"\xff":
-            continue
-        if i + whole > len(data):
-            if not ended:
-                return packets, data[i:]
-        elif int.from_bytes(data[i + whole - 2 : i + whole], "little") == crc16(data[i : i + whole - 2]):
-            body = data[i + _OVERHEAD : i + whole - 2].replace(_STUFFED, _PATTERN)
-            packets.append(Packet(data[i + 4], body[0], body[1:]))
-            end = i + whole
-    return packets, b"" if ended else _beginning(data[end:])
+    return sound_packets(buffer, ended, _HEADER, _length, _opened)
 
 
-def _beginning(data: bytes) -> bytes:
-    """The longest end of the data that a header may begin with."""
-    return next((_HEADER[:n] for n in (3, 2, 1) if data.endswith(_HEADER[:n])), b"")
+def _length(data: bytes, i: int) -> int:
+    """Bytes of the packet at an index; 0 if none can begin there."""
+    if data[i + 4 : i + 5] == b"\xff":
+        return 0
+    told = int.from_bytes(data[i + 5 : i + 7], "little") if i + _OVERHEAD <= len(data) else _LEAST
+    return _OVERHEAD + told if _LEAST <= told <= MOST else 0
+
+
+def _opened(data: bytes) -> tuple[Packet, int] | None:
+    """The packet, if its crc is right, and the bytes it uses up."""
+    if int.from_bytes(data[-2:], "little") != crc16(data[:-2]):
+        return None
+    body = data[_OVERHEAD:-2].replace(_STUFFED, _PATTERN)
+    return Packet(data[4], body[0], body[1:]), len(data)
 
 
 def command_for(packet: Packet, id: int) -> Command | None:

@@ -62,6 +62,7 @@ class VirtualBus:
         troubles: what goes wrong, and when; more by ``trouble``.
         seed: of what is random in troubles.
         witness: is told every command that reaches a servo.
+        adapter: time that the port's adapter holds answers back [s].
     """
 
     def __init__(
@@ -72,8 +73,10 @@ class VirtualBus:
         troubles: Sequence[Trouble] = (),
         seed: int = 0,
         witness: Witness | None = None,
+        adapter: float = 0.0,
     ) -> None:
         self.servos, self.clock, self.baudrate = tuple(servos), clock, baud
+        self.adapter = adapter
         self.packets = self.answers = 0
         self.pulled = False
         self._codec: Codec = codec(servos[0].profile.protocol if servos else 1.0)
@@ -168,10 +171,9 @@ class VirtualBus:
     def _obey(self, packet: Packet, time: float) -> float:
         """Let the servos concerned carry out a packet; returns when the line is free again."""
         told: list[tuple[VirtualServo, Command]] = []
+        tolerated = _SAME_RATE * self.baudrate
         for servo in self.servos:
-            if packet.id not in (servo.id, BROADCAST) or abs(servo.baud - self.baudrate) > (
-                _SAME_RATE * self.baudrate
-            ):
+            if packet.id not in (servo.id, BROADCAST) or abs(servo.baud - self.baudrate) > tolerated:
                 continue
             command = self._codec.command_for(packet, servo.id)
             if command is not None:
@@ -215,7 +217,7 @@ class VirtualBus:
         begin = time + late + min(delay for delay, _ in answers)
         end = begin + len(data) * self._byte_time
         if data:
-            heappush(self._coming, (end, self.answers, data))
+            heappush(self._coming, (end + self.adapter, self.answers, data))
         # A late answer holds nobody up: the others do not know of it.
         return (time if late else end), bool(data)
 

@@ -51,6 +51,10 @@ class VirtualServo:
         self.body = Body(profile.stall_torque, profile.voltage, angle, stiffness)
         self.table = bytearray(profile.size)
         self._id_at = profile.register("id").address
+        self._places = {
+            name: (register, slice(register.address, register.end))
+            for name, register in profile.registers.items()
+        }
         self.silent_until = -math.inf
         self._registered: tuple[int, bytes] | None = None
         self._alarms = 0
@@ -90,8 +94,8 @@ class VirtualServo:
 
     def get(self, name: str) -> int:
         """The value of a register, its sign decoded."""
-        register = self.profile.register(name)
-        return decode(register, int.from_bytes(self.table[register.address : register.end], "little"))
+        register, place = self._places[name]
+        return decode(register, int.from_bytes(self.table[place], "little"))
 
     def put(self, name: str, value: int) -> None:
         """Set a register from inside, whatever its access; the value must fit its range."""

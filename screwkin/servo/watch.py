@@ -39,8 +39,8 @@ class ServoFault:
     message: str
 
     def __str__(self) -> str:
-        who = f"{self.joint} (servo {self.id}): " if self.joint else ""
-        return f"{self.kind} fault at {self.time:.2f} s: {who}{self.message}"
+        who = f"{self.joint} (servo {self.id})" if self.joint else "all joints (all servos)"
+        return f"{self.kind} fault at {self.time:.2f} s: {who}: {self.message}"
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON data."""

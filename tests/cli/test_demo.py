@@ -16,7 +16,7 @@ def shown(tmp_path_factory):
     folder = tmp_path_factory.mktemp("demo") / "out"
     story = io.StringIO()
     with contextlib.redirect_stdout(story):
-        code = run(["demo", "--gait", "paper", "--steps", "2", "-o", str(folder)])
+        code = run(["demo", "--gait", "smooth", "--steps", "2", "-o", str(folder)])
     return code, story.getvalue(), folder
 
 
@@ -26,9 +26,10 @@ def test_the_default_robot_walks_and_the_story_names_every_stage(shown):
     for part in (
         "right_knee",
         "mobility 24",
-        "gait paper",
+        "gait smooth",
         "smallest margin",
         "pybullet",
+        "All 18 servos hold their positions.",
         "It walks: passed.",
     ):
         assert part in story
@@ -40,6 +41,8 @@ def test_the_folder_holds_trajectory_verdict_film_and_report(shown):
     names = {path.name for path in folder.iterdir()}
     assert {"trajectory.npz", "trajectory.csv", "validation.json", "walk.gif", "report.html"} <= names
     assert not [name for name in names if name.startswith(".")]
+    assert {"play.npz", "tracking.png"} <= names
+    assert "What the servos were told" in (folder / "report.html").read_text(encoding="utf-8")
     assert json.loads((folder / "validation.json").read_text(encoding="utf-8"))["passed"]
 
 
@@ -55,6 +58,26 @@ def test_a_walk_that_falls_ends_with_3_and_json_alone_on_stdout(cli, tmp_path):
     assert called.data["passed"] is False
     assert called.data["mobility"] == 24
     assert called.data["reasons"]
+    assert (called.data["packets"], called.data["servos"]) == (0, None), "nothing is sent that did not pass"
+
+
+def test_a_walk_too_fast_for_the_servos_is_shown_but_not_sent(cli, tmp_path):
+    from screwkin.model.library import find_gait
+
+    text = find_gait("walk").read_text(encoding="utf-8")
+    gait = tmp_path / "hasty.toml"
+    gait.write_text(text.replace("Tc = 1.5", "Tc = 0.8"), encoding="utf-8")
+    called = cli("demo", "--gait", gait, "--steps", 2, "-o", "out")
+    assert called.code == 0
+    assert "Refused: " in called.out
+    assert "rad/s, its servo at most 6.00" in called.out
+    assert not (tmp_path / "out" / "play.npz").exists()
+
+
+def test_json_counts_the_packets_and_tells_how_the_play_ended(cli):
+    data = cli("demo", "--gait", "smooth", "--steps", 1, "-o", "out", "--json").data
+    assert data["packets"] > data["servos"]["frames"] > 100
+    assert (data["servos"]["faults"], data["servos"]["state"]) == ([], "hold")
 
 
 def test_without_the_simulator_the_report_still_tells_the_rest(cli, monkeypatch, tmp_path):

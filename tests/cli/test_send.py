@@ -8,6 +8,7 @@ import shutil
 import signal
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from screwkin.cli import run
 from screwkin.files import read_npz
 from screwkin.model.table import load_robot
 from screwkin.servo.line import MonotonicClock
+from screwkin.servo.log import load_log
 from screwkin.servo.virtual import virtual_servos
 from screwkin.servo.virtual_bus import VirtualBus
 from screwkin.servo.virtual_terminal import PseudoTerminal
@@ -104,9 +106,21 @@ def test_speeds_above_the_servos_are_refused(cli, refused, tmp_path):
     assert "rad/s, its servo at most 6.00" in told
 
 
+def test_positions_beyond_the_limits_are_refused_with_joint_and_time(cli, refused, passed):
+    walk = load_trajectory(passed)
+    q = walk.q.copy()
+    q[40, walk.joint_names.index("left_elbow")] = 3.0
+    replace(walk, q=q).save(passed)
+    told = refused(cli("send", judged(passed)), 4)
+    assert "left_elbow at 3.0000 rad outside [" in told
+    assert "at 0.80 s" in told
+
+
 @pytest.mark.parametrize(
     ("words", "told"),
     [
+        (["--trouble", "deaf@3"], "--trouble is for virtual servos"),
+        (["--virtual", "--trouble", "fire@3"], "unknown kind 'fire'"),
         (["--go"], "--go needs a bus"),
         (["--port", "/dev/none", "--virtual"], "two buses"),
         (["--rate", "nan"], "rate"),
@@ -151,6 +165,38 @@ def test_a_play_that_ends_well_says_so(cli, passed, tmp_path):
 def test_servos_far_from_the_first_goal_are_refused_and_nothing_is_written(cli, refused, passed, tmp_path):
     told = refused(cli("send", passed, "--virtual", "--go", "--far", "0.001", "-o", tmp_path / "out"), 4)
     assert "from its first goal" in told
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_trouble_stops_the_play_and_all_is_told(cli, passed, tmp_path):
+    words = ["--virtual", "--go", "--trouble", "deaf@2:11", "--on-fault", "limp", "-o", tmp_path / "out"]
+    called = cli("send", passed, *words, "--json")
+    assert called.code == 4
+    assert "lost fault at 2." in called.err
+    assert (
+        "right_hip_pitch (servo 11): 5 replies in a row are missing. 17 of 18 servos are limp" in called.err
+    )
+    [fault] = called.data["faults"]
+    assert (fault["kind"], fault["joint"], fault["id"]) == ("lost", "right_hip_pitch", 11)
+    log = load_log(tmp_path / "out" / "play.npz")
+    assert log.meta["faults"] == called.data["faults"]
+    assert log.time[-1] == pytest.approx(fault["time"], abs=0.021)
+
+
+def test_a_cable_pulled_in_mid_walk_ends_within_200_ms_with_a_log(cli, passed, tmp_path):
+    """In simulated time; the play begins some 50 ms after the bus was opened."""
+    words = ["--virtual", "--go", "--trouble", "pulled@2.5", "-o", tmp_path / "out", "--json"]
+    called = cli("send", passed, *words)
+    assert called.code == 4
+    assert "line fault at 2.4" in called.err
+    assert "all joints (all servos): the port is gone" in called.err
+    assert 2.4 < called.data["faults"][0]["time"] < 2.5 + 0.2
+    assert 2.4 < load_log(tmp_path / "out" / "play.npz").time[-1] < 2.5
+
+
+def test_a_cable_pulled_before_anything_moved_is_refused(cli, refused, passed, tmp_path):
+    words = ["--virtual", "--go", "--trouble", "pulled@0.01", "-o", tmp_path / "out"]
+    assert "the port is gone" in refused(cli("send", passed, *words), 4)
     assert not (tmp_path / "out").exists()
 
 

@@ -227,40 +227,6 @@ def test_torque_and_speed_are_limited_on_every_servo():
     assert 0 < min(rig.written(32)) <= max(rig.written(32)) <= 516
 
 
-def test_seeded_campaign_of_faults_never_writes_beyond_limits():
-    """Random troubles at random times; limits are tightened so that a slip would show."""
-    q = steps().q
-    margin = math.radians(2)
-    joints = tuple(
-        replace(joint, lower=float(q[:, k].min()) - margin, upper=float(q[:, k].max()) + margin)
-        for k, joint in enumerate(ROBOT.joints)
-    )
-    robot = replace(ROBOT, joints=joints)
-    servos = {
-        servo.id: (servo, joint) for servo, joint in zip(ServoMap.of(robot).joints, joints, strict=True)
-    }
-    kinds = ("deaf", "dropped", "corrupted", "truncated", "late", "noise", "reset", "overload", "overheat")
-    for seed in range(8):
-        rng = np.random.default_rng(seed)
-        state = ("hold", "limp")[seed % 2]
-        at = float(rng.uniform(1.2, 4.0))
-        kind = (*kinds, "brown-out", "pulled")[int(rng.integers(11))]
-        id = None if rng.random() < 0.3 else int(rng.integers(1, 19))
-        rig = Rig(
-            Trouble(kind, at, at + float(rng.uniform(0.05, 2.0)), id), robot=robot, seed=seed, on_fault=state
-        )
-        outcome = rig.play()
-        for _, number, command in rig.told:
-            if command.kind == "write" and command.address == 30:
-                servo, joint = servos[number]
-                angle = servo.angle_from_ticks(int.from_bytes(command.data[:2], "little"))
-                assert joint.lower - 1e-9 <= angle <= joint.upper + 1e-9, (seed, kind)
-        assert rig.player.log.frames == outcome.frames
-        assert outcome.final.state in (state, "hold", "unknown"), (seed, kind)
-        for fault in outcome.faults:
-            assert fault.id in (id, -1) or id is None, (seed, kind, str(fault))
-
-
 @pytest.mark.parametrize("rate", [0.0, -50.0, math.nan, math.inf, 5000.0])
 def test_a_rate_that_is_none_is_bad_input(rate):
     with pytest.raises(InputError):

@@ -1,0 +1,55 @@
+"""The picture of a play on servos: commanded against measured."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from screwkin.report.account import Account
+from screwkin.report.motion import HUES, common_prefix
+from screwkin.report.style import PLAIN, Figure, legend_above, new_figure, shade_swings, shown
+from screwkin.servo.log import PlayLog
+
+
+def tracking(account: Account, log: PlayLog) -> Figure:
+    """Commands and readings of the legs' joints, one panel a leg, and the tracking error of all joints."""
+    robot = account.robot
+    legs = [limb for limb in robot.limbs if limb.kind == "leg"]
+    start = log.start if np.isfinite(log.start) else 0.0
+    time, read = log.time - start, log.read_at - start
+    rows = len(legs) + 1
+    figure, axes = new_figure(0.9 + 2.3 * rows, rows, sharex=True, squeeze=False)
+    for limb, one in zip(legs, axes[:, 0], strict=False):
+        shade_swings(one, account)
+        joints = robot.path_to(limb.link)
+        common = common_prefix([robot.joints[i].name for i in joints])
+        for k, i in enumerate(joints):
+            colour = HUES[k % len(HUES)]
+            one.plot(time, np.degrees(log.command[:, i]), color=colour, linewidth=0.9)
+            one.plot(
+                read[:, i], np.degrees(log.position[:, i]), ".", color=colour, markersize=2.6,
+                label=shown(robot.joints[i].name[len(common) :]),
+            )  # fmt: skip
+        one.set_ylabel(f"{shown(limb.name)} [deg]")
+    _errors(axes[-1, 0], account, log, read)
+    axes[-1, 0].set_xlim(time[0] if len(time) else 0.0, time[-1] if len(time) else 1.0)
+    axes[-1, 0].set_xlabel("time of the walk [s]; before 0 the soft start")
+    legend_above(figure, list(axes[:, 0]), columns=4)
+    return figure
+
+
+def _errors(
+    axes: Figure, account: Account, log: PlayLog, read: np.ndarray[tuple[int, ...], np.dtype[np.float64]]
+) -> None:
+    """How far each joint is from its last goal; the worst one by name."""
+    error = np.degrees(np.abs(log.position - log.command))
+    worst = int(np.argmax(np.nanmax(error, axis=0, initial=0.0)))
+    shade_swings(axes, account)
+    for i, name in enumerate(log.joint_names):
+        seen = np.isfinite(error[:, i])
+        bold = i == worst
+        axes.plot(
+            read[seen, i], error[seen, i], color="#B00020" if bold else PLAIN, linewidth=1.1 if bold else 0.5,
+            alpha=1.0 if bold else 0.35, label=f"{shown(name)}, the worst" if bold else None, zorder=2 + bold,
+        )  # fmt: skip
+    axes.set_ylabel("off its goal [deg]")
+    axes.set_ylim(bottom=0.0)
