@@ -41,12 +41,13 @@ def environment(name: str, packages: Sequence[str]) -> Path | None:
     if (place / "done").exists():
         return python
     venv.create(place, with_pip=True, clear=True)
-    inherited = sysconfig.get_path("purelib", vars={"base": str(place)})
-    Path(inherited, "zz-inherited.pth").write_text(sysconfig.get_path("purelib") + "\n")
     done = subprocess.run(
         [str(python), "-m", "pip", "install", "--quiet", *packages], capture_output=True, text=True
     )
     if done.returncode:
         return None
+    # Only now, so that everything the peer needs is really there, in the versions that it asks for.
+    inherited = sysconfig.get_path("purelib", vars={"base": str(place)})
+    Path(inherited, "zz-inherited.pth").write_text(sysconfig.get_path("purelib") + "\n")
     (place / "done").touch()
     return python

@@ -13,6 +13,14 @@ SHORTEST = 2e-3
 
 
 @dataclass(frozen=True)
+class Elapsed:
+    """What a run in another process says of itself: wall and processor time [s]."""
+
+    wall: float
+    cpu: float
+
+
+@dataclass(frozen=True)
 class Timing:
     """Seconds per call in every round: wall time, and processor time of all threads.
 
@@ -35,38 +43,42 @@ class Timing:
         return statistics.median(self.cpu_rounds)
 
 
-def interleaved(runs: Mapping[str, Run], rounds: int, budget: float = 20.0) -> dict[str, Timing]:
+def interleaved(runs: Mapping[str, Run], rounds: int, budget: float = 60.0) -> dict[str, Timing]:
     """Time every contestant once per round, in turn and each round in the reverse order of the last.
 
-    A call too short for the clock is repeated within its turn. Rounds end early, after three at least, when
-    ``budget`` [s] is spent.
+    A call too short for the clock is repeated within its turn. Rounds end early when ``budget`` [s] is spent.
+    Every contestant must have run before, so that its compilers and caches are warm.
     """
     repeats = {name: _repeats(run) for name, run in runs.items()}
     wall: dict[str, list[float]] = {name: [] for name in runs}
     cpu: dict[str, list[float]] = {name: [] for name in runs}
     order, begin = list(runs), time.perf_counter()
     for done in range(rounds):
-        if done >= 3 and time.perf_counter() - begin > budget:
+        if done and time.perf_counter() - begin > budget:
             break
         for name in order:
             run, times = runs[name], repeats[name]
-            cpu_before, before = time.process_time(), time.perf_counter()
-            for _ in range(times):
-                run()
-            wall[name].append((time.perf_counter() - before) / times)
-            cpu[name].append((time.process_time() - cpu_before) / times)
+            spent = _measured(run, times)
+            wall[name].append(spent.wall)
+            cpu[name].append(spent.cpu)
         order.reverse()
     return {name: Timing(tuple(wall[name]), tuple(cpu[name])) for name in runs}
 
 
+def _measured(run: Run, times: int) -> Elapsed:
+    """Time per call of several calls in a row."""
+    cpu_before, before = time.process_time(), time.perf_counter()
+    returned = [run() for _ in range(times)]
+    wall, cpu = time.perf_counter() - before, time.process_time() - cpu_before
+    told = [value for value in returned if isinstance(value, Elapsed)]
+    if told:
+        wall, cpu = sum(value.wall for value in told), sum(value.cpu for value in told)
+    return Elapsed(wall / times, cpu / times)
+
+
 def _repeats(run: Run) -> int:
-    """Calls that last ``SHORTEST`` together; the first call warms caches and compilers."""
-    run()
+    """Calls that last ``SHORTEST`` together."""
     times = 1
-    while True:
-        begin = time.perf_counter()
-        for _ in range(times):
-            run()
-        if time.perf_counter() - begin > SHORTEST:
-            return times
+    while _measured(run, times).wall * times < SHORTEST:
         times *= 2
+    return times

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from benchmarks.compiler import FAST, compiled, compiler, pointer
+from benchmarks.compiler import FAST, compiled, compiler
 from benchmarks.environments import folder, installed_apart
 from benchmarks.workloads import Motion
 from screwkin.model.robot import Limb, Robot
@@ -34,8 +34,6 @@ DEFINED = (  # what Pinocchio's own build files define for whoever uses its head
     "-DBOOST_FUSION_INVOKE_MAX_ARITY=12",
 )
 FLAGS = ("-std=c++17", *FAST, "-DNDEBUG", *DEFINED)
-TOLERANCE, DAMPING, MOST = 1e-8, 1e-6, 100
-"""Of damped least squares: norm of log6 [rad and m] at which it has arrived, added to J J^T, iterations."""
 
 
 def library(progress: Any = print) -> Path | None:
@@ -133,7 +131,7 @@ class Loop:
         self.joints = list(self.description.joints)
         self._c = ctypes.CDLL(str(library))
         self._c.make.restype = ctypes.c_void_p
-        given = [_address(a) if isinstance(a, np.ndarray) else int(a) for a in self.description.arguments]
+        given = [address(a) if isinstance(a, np.ndarray) else int(a) for a in self.description.arguments]
         self._robot = ctypes.c_void_p(self._c.make(*given))
 
     def __del__(self) -> None:
@@ -157,13 +155,14 @@ class Loop:
         seen = np.concatenate([change[:, :3], change[:, 3:] - np.cross(twist[:, :3], twist[:, 3:])], axis=1)
         return self.velocity(T, seen, qdd)
 
-    def call(self, name: str, *arguments: Any) -> None:
-        """One of the C++ functions, on this robot."""
-        given = [pointer(a) if isinstance(a, np.ndarray) and a.dtype == float else a for a in arguments]
-        getattr(self._c, name)(self._robot, *given)
+    def bound(self, name: str, *arguments: Any) -> Callable[[], None]:
+        """A call of one of the C++ functions on this robot, with its arguments ready."""
+        function = getattr(self._c, name)
+        given = [address(a) if isinstance(a, np.ndarray) else a for a in arguments]
+        return lambda: function(self._robot, *given)
 
 
-def _address(array: Array) -> Any:
+def address(array: Array) -> Any:
     return array.ctypes.data_as(ctypes.c_void_p)
 
 
@@ -173,8 +172,10 @@ def rates(loop: Loop, given: Motion) -> Callable[[], Array]:
     motions = np.ascontiguousarray(np.concatenate([given.waist, *given.tips.values()], axis=1))
     out = np.zeros((len(q), 12 * len(loop.description.limbs) + len(loop.joints)))
 
+    call = loop.bound("rates", q, motions, out, ctypes.c_long(len(q)), motions.shape[1])
+
     def run() -> Array:
-        loop.call("rates", q, motions, out, ctypes.c_long(len(q)), motions.shape[1])
+        call()
         return out
 
     return run
