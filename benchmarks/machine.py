@@ -1,0 +1,67 @@
+"""The machine and the software on which something was measured, without its name or any path."""
+
+from __future__ import annotations
+
+import os
+import platform
+import subprocess
+from collections.abc import Sequence
+from importlib import metadata
+from pathlib import Path
+
+from benchmarks.compiler import compiler
+
+WIDE = ("avx", "avx2", "fma", "avx512f", "avx512dq", "asimd", "sve")
+THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
+
+
+def pin_threads(count: int = 1) -> None:
+    """One thread for the libraries that start their own; must come before they are imported."""
+    for name in THREADS:
+        os.environ.setdefault(name, str(count))
+
+
+def description(packages: Sequence[str]) -> dict[str, object]:
+    """Processor, cores, wide instructions, versions; and how busy the machine was."""
+    facts = _processor()
+    flags = facts.get("flags", facts.get("Features", "")).split()
+    names = {key: facts.get(key, "") for key in ("model name", "cpu family", "model")}
+    return {
+        "processor": " ".join(names["model name"].split()) or platform.machine(),
+        "family": f"{names['cpu family']} model {names['model']}" if names["model"] else "",
+        "cores": os.cpu_count(),
+        "instructions": [flag for flag in WIDE if flag in flags],
+        "system": f"{platform.system()} {platform.machine()}",
+        "load": round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else None,
+        "threads": {name: os.environ.get(name, "") for name in THREADS[:1]},
+        "compiler": compiler_version(),
+        "python": platform.python_version(),
+        "versions": {name: version for name in packages if (version := version_of(name))},
+    }
+
+
+def version_of(package: str) -> str:
+    """Its version; empty where it is not installed."""
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return ""
+
+
+def compiler_version() -> str:
+    """The first line that the C++ compiler says of itself."""
+    name = compiler(plus_plus=True)
+    if name is None:
+        return ""
+    told = subprocess.run([name, "--version"], capture_output=True, text=True).stdout
+    return told.splitlines()[0] if told else name
+
+
+def _processor() -> dict[str, str]:
+    """The kernel's facts about the first core."""
+    source = Path("/proc/cpuinfo")
+    if not source.exists():
+        return {}
+    lines = source.read_text().split("\n\n")[0].splitlines()
+    pairs = (line.partition(":")[::2] for line in lines if ":" in line)
+    return {key.strip(): value.strip() for key, value in pairs}

@@ -1,0 +1,1 @@
+"""Other engines on the workloads, each through its usual interface."""
