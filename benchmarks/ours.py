@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,16 @@ from benchmarks.contest import Contestant, Contestants, Result
 from benchmarks.workloads import Dynamic, Motion, Reach, Stance
 from screwkin.analysis.workspace import workspace
 from screwkin.gait.balance import ground_reaction
+from screwkin.kernel import body, limbs
+from screwkin.kernel.emit_python import run_numpy
+from screwkin.kernel.native import THREADED_FROM
+from screwkin.kernel.program import Program
+from screwkin.kernel.records import identifier
+from screwkin.kernel.run import machine_code, python_function
+from screwkin.kernel.run import run as kernel
 from screwkin.model.robot import Robot
+
+Array = Any
 
 NAME = "screwkin"
 
@@ -28,7 +38,60 @@ def rates(robot: Robot, given: Motion) -> Contestants:
         followed = sk.secondary_rates(mechanism, state, primary)
         return {"poses": np.stack(poses, axis=1), "rates": followed[:, joints]}
 
-    return {f"{NAME}, public functions": Contestant(run)}
+    return {f"{NAME}, public functions": Contestant(run), **_rate_kernels(robot, given)}
+
+
+def _rate_kernels(robot: Robot, given: Motion) -> Contestants:
+    """The same by the compiled program, on every path that this computer has."""
+    program = body.motion(robot)
+    told = {"T_world_base": given.T_world_base, "q": given.q, "base_twist": given.waist}
+    told |= {identifier(tip): values for tip, values in given.tips.items()}
+    count = len(given.q)
+    flat = [np.ascontiguousarray(told[g.name].reshape(count, g.size)) for g in program.inputs]
+    filled = [np.empty((count, g.size)) for g in program.outputs]
+
+    def result(_: Any) -> Result:
+        named = dict(zip((g.name for g in program.outputs), filled, strict=True))
+        return {"poses": named["T_world_tip"].reshape(count, -1, 4, 4), "rates": named["qd"]}
+
+    contestants = {}
+    compiled = machine_code(program)
+    if compiled is not None:
+        alone = replace(compiled, cores=1)
+        contestants[f"{NAME}, C kernel, one core"] = Contestant(lambda: alone(flat, filled), result)
+        if count >= THREADED_FROM:
+            contestants[f"{NAME}, C kernel, all cores"] = Contestant(lambda: compiled(flat, filled), result)
+    if count == 1:
+        function, sample = python_function(program), [array[0].tolist() for array in flat]
+
+        def told_once(lists: Any) -> Result:
+            poses, qd, _ = (np.array(values) for values in lists)
+            return {"poses": poses.reshape(1, -1, 4, 4), "rates": qd[None]}
+
+        contestants[f"{NAME}, generated Python"] = Contestant(lambda: function(*sample), told_once)
+        return contestants
+    contestants[f"{NAME}, NumPy kernel"] = Contestant(lambda: run_numpy(program, flat, filled), result)
+    return contestants | {f"{NAME}, JAX kernel": _jax(program, flat)}
+
+
+def _jax(program: Program, flat: list[Array]) -> Contestant:
+    """The program in JAX, the batch last, compiled beforehand."""
+    import jax
+
+    from screwkin.kernel.emit_jax import function
+
+    with jax.enable_x64(True):
+        arrays = [
+            jax.numpy.asarray(a.T.reshape(*g.shape, len(a)))
+            for a, g in zip(flat, program.inputs, strict=True)
+        ]
+        compiled = jax.jit(function(program)).lower(*arrays).compile()
+
+    def result(found: Any) -> Result:
+        poses, qd, _ = (np.moveaxis(np.asarray(x), -1, 0) for x in found)
+        return {"poses": poses, "rates": qd}
+
+    return Contestant(lambda: jax.block_until_ready(compiled(*arrays)), result)
 
 
 def reach(robot: Robot, given: Reach) -> Contestants:
@@ -40,7 +103,17 @@ def reach(robot: Robot, given: Reach) -> Contestants:
     def result(found: Any) -> Result:
         return {"q": found.best, "solved": found.valid.any(axis=-1)}
 
-    return {f"{NAME}, public functions": Contestant(run, result, "all branches in closed form")}
+    program = limbs.limb_nearest(robot, given.limb.name)
+    told = {"T_base_tip": given.target, "guess": given.guess}
+
+    def nearest(found: Any) -> Result:
+        return {"q": found["q"], "solved": (found["found"] == 1)[:, 0] & (found["error"] <= 1e-11)[:, 0]}
+
+    contestants = {f"{NAME}, public functions": Contestant(run, result, "all branches in closed form")}
+    if machine_code(program) is not None:
+        note = "the closed form's branch nearest to the guess"
+        contestants[f"{NAME}, C kernel"] = Contestant(lambda: kernel(program, told, path="C"), nearest, note)
+    return contestants
 
 
 def positions(robot: Robot, given: Stance) -> Contestants:
@@ -64,7 +137,16 @@ def balance(robot: Robot, given: Dynamic) -> Contestants:
         )
         return {"com": com, "momentum": sk.momentum(robot, state, given.qd, given.twist), "zmp": zmp}
 
-    return {f"{NAME}, public functions": Contestant(run)}
+    program = body.balance(robot)
+    told = {"T_world_base": given.T_world_base, "q": given.q, "qd": given.qd, "qdd": given.qdd}
+    told |= {"base_twist": given.twist, "base_acceleration": given.acceleration}
+    contestants = {f"{NAME}, public functions": Contestant(run)}
+    if machine_code(program) is not None:
+        asked = ("com", "momentum", "zmp")
+        contestants[f"{NAME}, C kernel"] = Contestant(
+            lambda: kernel(program, told, path="C"), lambda found: {name: found[name] for name in asked}
+        )
+    return contestants
 
 
 def gait(robot: Robot, seconds: float, rate: float) -> Contestants:

@@ -29,6 +29,7 @@ VERBS = {
     "validate": "Simulate a trajectory and give a verdict.",
     "workspace": "Where a foot can go, held level, and which joint limit cuts there.",
     "stiffness": "How far a foot yields on elastic joints, all over its workspace.",
+    "codegen": "A robot's formulas as C, for other programs and microcontrollers.",
     "send": "Play a validated trajectory to the servos; a dry run unless --go.",
     "bus": "Servos on a bus, or virtual ones: screwkin bus --help lists the verbs.",
     "reproduce": "Every table and figure of a paper, its value beside ours.",

@@ -8,6 +8,7 @@ import typer
 
 from screwkin.cli.options import AsJson, RobotName, place
 from screwkin.cli.output import aligned, print_json
+from screwkin.kernel.run import large_batches
 from screwkin.model.table import load_robot
 from screwkin.report.facts import Facts, facts_of
 
@@ -27,7 +28,7 @@ def info(
     """Mass, closed mechanism (couplings, circuits, mobility, network matrix) and conditioning of a robot."""
     told = facts_of(load_robot(robot), posture, place(at, "--at") or (0.0, 0.0, 0.0), place(point, "--point"))
     if as_json:
-        print_json(told.to_dict())
+        print_json(told.to_dict() | {"large_batches": large_batches()})
     else:
         print(_text(told))
     return 0
@@ -54,6 +55,7 @@ def _text(told: Facts) -> str:
         ("primary", _listed(mechanism.primary)),
         ("secondary", _listed(mechanism.secondary)),
         ("cond(Ns)", f"{told.condition:.4g}"),
+        ("large batches by", {"C": "compiled C", "numpy": "NumPy (no C compiler found)"}[large_batches()]),
     ]
     limbs = [
         (limb.limb, f"{limb.sigma:.4f}", f"NEAR A SINGULARITY: {limb.cause}" if limb.near else "regular")

@@ -52,15 +52,19 @@ def compiler() -> str | None:
 
 @dataclass(frozen=True, eq=False)
 class Native:
-    """A compiled program. Its function takes a number of samples and one pointer for every array."""
+    """A compiled program. Its function takes a number of samples and one pointer for every array.
+
+    A large batch is shared among ``cores``; default: all that this process may use.
+    """
 
     program: Program
     function: Any
+    cores: int | None = None
 
     def __call__(self, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
         """Fill flat outputs (B, size) from flat inputs (B, size), all C-contiguous doubles."""
         count, arrays = len(outputs[0]), [*inputs, *outputs]
-        cores = _cores() if count >= THREADED_FROM else 1
+        cores = (self.cores or _cores()) if count >= THREADED_FROM else 1
         bounds = [count * k // cores for k in range(cores + 1)]
         parts = [
             (stop - start, *(a.ctypes.data + start * a.strides[0] for a in arrays))

@@ -20,7 +20,7 @@ from screwkin.kernel import emit_python, native
 from screwkin.kernel.program import Program
 
 Array = Any
-Path_ = Literal["python", "numpy", "C"]
+Way = Literal["python", "numpy", "C"]
 
 FROM = 1000
 """Samples from which callers make programs at all; for fewer, running the formulas themselves is quicker."""
@@ -34,7 +34,7 @@ def run(
     program: Program,
     inputs: Mapping[str, Array],
     batch: tuple[int, ...] | None = None,
-    path: Path_ | None = None,
+    path: Way | None = None,
 ) -> dict[str, Array]:
     """Compute a program for a batch.
 
@@ -62,11 +62,16 @@ def run(
     return {g.name: a.reshape(*batch, *g.shape) for g, a in zip(program.outputs, filled, strict=True)}
 
 
-def chosen_path(program: Program, count: int) -> Path_:
+def chosen_path(program: Program, count: int) -> Way:
     """The path that ``run`` takes for so many samples."""
     if native.compiler() and (count >= COMPILE_FROM or native.is_kept(program)) and machine_code(program):
         return "C"
     return "python" if count <= PYTHON_UP_TO else "numpy"
+
+
+def large_batches() -> Way:
+    """The path of large batches on this computer: C where a compiler is found, else NumPy."""
+    return "C" if native.compiler() else "numpy"
 
 
 @cache

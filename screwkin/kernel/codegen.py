@@ -1,0 +1,199 @@
+"""C files of a robot for other programs and microcontrollers: source, header, and a driver that tests."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from screwkin.errors import InputError, UnknownNameError
+from screwkin.kernel import body, limbs
+from screwkin.kernel.emit_c import Real, header, source
+from screwkin.kernel.program import Group, Program
+from screwkin.kernel.records import identifier
+from screwkin.kernel.run import run
+from screwkin.kinematics.positions import frame_pose, link_displacements
+from screwkin.model.robot import Robot
+from screwkin.se3 import as_array
+from screwkin.solve.chain import Chain
+
+Array = Any
+
+TOLERANCE: Mapping[Real, float] = {"double": 1e-12, "float": 1e-5}
+"""Largest difference that the driver accepts, relative to the largest entry of a result (at least 1)."""
+
+
+def _closed_limbs(robot: Robot) -> list[Program]:
+    return [limbs.limb_nearest(robot, x.name) for x in robot.limbs if limbs.solvable(robot, x.tip, True)]
+
+
+def _rates(accelerations: bool) -> Callable[[Robot], list[Program]]:
+    def make(robot: Robot) -> list[Program]:
+        if not robot.limbs or not body.follows(robot, robot.joint_names):
+            raise InputError(
+                f"{robot.name}: rates follow limbs of six joints, or of three, that share none and have no "
+                "loops of their own; ask for tips, com or zmp"
+            )
+        return [body.motion(robot, accelerations)]
+
+    return make
+
+
+def _weighing(make: Callable[[Robot], Program]) -> Callable[[Robot], list[Program]]:
+    def made(robot: Robot) -> list[Program]:
+        if not robot.mass > 0:
+            raise InputError(f"{robot.name} has no mass, so it has neither a centre of mass nor a ZMP")
+        return [make(robot)]
+
+    return made
+
+
+KINDS: Mapping[str, Callable[[Robot], list[Program]]] = {
+    "tips": lambda robot: [body.tip_poses(robot)] if robot.limbs else [],
+    "com": _weighing(body.mass_center),
+    "rates": _rates(False),
+    "motion": _rates(True),
+    "zmp": _weighing(body.balance),
+    "ik": _closed_limbs,
+}
+"""What can be asked for."""
+
+
+def programs_of(robot: Robot, kinds: Sequence[str]) -> list[Program]:
+    """The programs of some kinds, each once.
+
+    Raises:
+        UnknownNameError: there is no such kind. InputError: the robot has no such program.
+    """
+    found: dict[str, Program] = {}
+    for kind in kinds:
+        if kind not in KINDS:
+            raise UnknownNameError("kind of program", kind, tuple(KINDS))
+        made = KINDS[kind](robot)
+        if not made:
+            lacks = "limb" if kind == "tips" else "limb with a closed form"
+            raise InputError(f"{robot.name} has no {lacks}, which {kind} needs")
+        found |= {program.name: program for program in made}
+    if not found:
+        raise InputError(f"nothing is asked for; valid: {', '.join(KINDS)}")
+    return list(found.values())
+
+
+def c_files(robot: Robot, programs: Sequence[Program], real: Real = "double") -> dict[str, str]:
+    """Text by file name: ``NAME.h``, ``NAME.c``, the driver ``test_NAME.c`` and a README."""
+    name = identifier(robot.name)
+    return {
+        f"{name}.h": header(programs, f"{name.upper()}_H", real),
+        f"{name}.c": source(programs, f"{name}.h"),
+        f"test_{name}.c": _driver(robot, programs, name, TOLERANCE[real]),
+        "README.md": _readme(robot, programs, name, real),
+    }
+
+
+def example(robot: Robot, program: Program) -> dict[str, Array]:
+    """One sample of inputs near the first posture, the same at every call."""
+    rng = np.random.default_rng(0)
+    posture = robot.posture("home") if any(p.name == "home" for p in robot.postures) else None
+    home = np.array(posture.q if posture else [0.1] * len(robot.joints), dtype=float)
+    q, T = home + rng.uniform(-0.1, 0.1, len(home)), np.eye(4)
+    T[2, 3] = posture.base_height if posture else 0.0
+    told: dict[str, Array] = {"T_world_base": T, "q": q}
+    for limb in robot.limbs:
+        if program.name == identifier(robot.name, limb.name, "nearest"):
+            pose = as_array(frame_pose(robot, link_displacements(robot, q.tolist()), limb.tip))
+            told |= {"T_base_tip": pose, "guess": home[list(Chain.of(robot, limb.name).joints)]}
+    return {g.name: told[g.name] if g.name in told else rng.uniform(-1, 1, g.shape) for g in program.inputs}
+
+
+def _array(name: str, values: Array) -> str:
+    return f"static const screwkin_real {name}[] = {{{', '.join(map(repr, np.ravel(values).tolist()))}}};"
+
+
+def _driver(robot: Robot, programs: Sequence[Program], name: str, tolerance: float) -> str:
+    """A program that runs every function on one sample and on nineteen, against numbers from Python."""
+    parts = []
+    for program in programs:
+        given = example(robot, program)
+        wanted = run(program, given, path="numpy")
+        parts += [_array(f"{program.name}_{g.name}", given[g.name]) for g in program.inputs]
+        parts += [_array(f"{program.name}_{g.name}_wanted", wanted[g.name]) for g in program.outputs]
+        parts.append(_trial(program))
+    calls = "\n".join(f"    failed += try_{p.name}(1) + try_{p.name}(SAMPLES);" for p in programs)
+    return f"""#include "{name}.h"
+#include <stdio.h>
+
+#define SAMPLES 19
+
+static int differs(const char *what, const screwkin_real *found, const screwkin_real *wanted,
+    size_t n, size_t m)
+{{
+    double scale = 1.0, worst = 0.0;
+    for (size_t k = 0; k < n; ++k)
+        if (wanted[k] > scale || -wanted[k] > scale)
+            scale = wanted[k] < 0 ? -wanted[k] : wanted[k];
+    for (size_t k = 0; k < n * m; ++k) {{
+        const double gap = (double)found[k] - (double)wanted[k % n];
+        if (!(gap <= worst && -gap <= worst))
+            worst = gap < 0 ? -gap : gap;
+    }}
+    printf("%-40s %3d samples: largest difference %.2g\\n", what, (int)m, worst / scale);
+    return !(worst <= {tolerance!r} * scale);
+}}
+
+{chr(10).join(parts)}
+
+int main(void)
+{{
+    int failed = 0;
+{calls}
+    return failed ? 1 : 0;
+}}
+"""
+
+
+def _trial(program: Program) -> str:
+    def buffer(group: Group) -> str:
+        return f"    static screwkin_real {group.name}[{group.size} * SAMPLES];"
+
+    loads = "\n".join(
+        f"        for (size_t k = 0; k < {g.size}; ++k)\n"
+        f"            {g.name}[i * {g.size} + k] = {program.name}_{g.name}[k];"
+        for g in program.inputs
+    )
+    checks = " + ".join(
+        f'differs("{program.name}: {g.name}", {g.name}, {program.name}_{g.name}_wanted, {g.size}, samples)'
+        for g in program.outputs
+    )
+    arguments = ", ".join(["samples", *(g.name for g in (*program.inputs, *program.outputs))])
+    buffers = "\n".join(buffer(g) for g in (*program.inputs, *program.outputs))
+    return f"""
+static int try_{program.name}(size_t samples)
+{{
+{buffers}
+    for (size_t i = 0; i < samples; ++i) {{
+{loads}
+    }}
+    {program.name}({arguments});
+    return {checks};
+}}
+"""
+
+
+def _readme(robot: Robot, programs: Sequence[Program], name: str, real: Real) -> str:
+    rows = "\n".join(f"- `{p.name}`: {p.about} {p.operations} operations a sample." for p in programs)
+    return f"""# {robot.name} in C
+
+Made by screwkin from the screw table of `{robot.name}`; numbers are of type `{real}`, units SI, angles in
+rad. No allocation; the square root and `floor` of the C library are all that is needed. `{name}.h` tells the
+arguments: arrays hold sample after sample, row by row.
+
+{rows}
+
+For vectors over the samples and fused multiply-adds: `-O3 -march=native -ffp-contract=fast -fno-math-errno
+-fno-trapping-math`. The driver compares with numbers from Python and exits with 1 if one differs:
+
+```sh
+cc -std=c99 -O2 -o test_{name} test_{name}.c {name}.c -lm && ./test_{name}
+```
+"""
