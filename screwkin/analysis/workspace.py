@@ -17,6 +17,9 @@ from typing import Any
 import numpy as np
 
 from screwkin.errors import InputError
+from screwkin.kernel.limbs import solvable
+from screwkin.kernel.maps import limb_map
+from screwkin.kernel.run import FROM, run
 from screwkin.model.robot import Robot
 from screwkin.se3 import as_array, cross, dot, norm
 from screwkin.solve.branches import LimbSolutions
@@ -31,6 +34,8 @@ LEVELS = (0.745, 0.80, 0.86, 0.915, 0.985)
 REACHABLE, OUT_OF_REACH = 0, 1
 BLOCK = 4096
 """Points solved together, so that intermediate arrays stay in the processor's cache."""
+LARGE_BLOCK = 131_072
+"""Points that a kernel computes together: it keeps to the cache by itself, and shares them among cores."""
 LARGEST_GRID = 2_000_000
 
 
@@ -159,22 +164,20 @@ def _level(robot: Robot, chain: Chain, height: float, resolution: float, progres
     """The map of one height."""
     x, y, near = _grid(chain, height, resolution)
     n, count = len(chain.joints), near.size
-    T = as_array(chain.tip).astype(float)
     cause = np.full(count, OUT_OF_REACH, dtype=np.int16)
     inverse, q = np.full(count, np.nan), np.full((count, n), np.nan)
-    points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     length, guess = normalising_length(chain), _guess(robot, chain)
     tried = np.flatnonzero(near)
-    for begin in range(0, len(tried), BLOCK):
-        here = tried[begin : begin + BLOCK]
-        target = np.tile(T, (len(here), 1, 1))
-        target[:, :2, 3], target[:, 2, 3] = points[here], -height
-        start = np.tile(guess, (len(target), 1))
-        found = solve_limb(chain, target, "auto", start, IkSettings(), (len(target),), nearest=False)
-        cause[here] = _causes(chain, found)
-        good = cause[here] == REACHABLE
-        q[here[good]] = found.best[good]
-        inverse[here[good]] = _inverse_condition(chain, found.best[good], target[good], length)
+    compiled = len(tried) >= FROM and solvable(robot, chain.limb, True)
+    block = LARGE_BLOCK if compiled else BLOCK
+    for begin in range(0, len(tried), block):
+        here = tried[begin : begin + block]
+        row, column = np.divmod(here, len(y))
+        points = np.stack([x[row], y[column], np.full(len(here), -height)], axis=1)
+        if compiled:
+            cause[here], q[here], inverse[here] = _compiled(robot, chain, points, guess, length)
+        else:
+            cause[here], q[here], inverse[here] = _found(chain, points, guess, length)
         progress((begin + len(here)) / len(tried))
     rows, columns = _window((cause != OUT_OF_REACH).reshape(len(x), len(y)))
     shape = (len(x), len(y))
@@ -192,6 +195,42 @@ def _level(robot: Robot, chain: Chain, height: float, resolution: float, progres
         inverse.reshape(shape)[rows, columns],
         q.reshape(*shape, n)[rows, columns],
     )
+
+
+def _found(chain: Chain, points: Array, guess: Array, length: float) -> tuple[Array, Array, Array]:
+    """Cause (B,), q (B, n) and inverse condition (B,) where the tip is at points (B, 3) of the base frame."""
+    count = len(points)
+    target = np.tile(as_array(chain.tip).astype(float), (count, 1, 1))
+    target[:, :3, 3] = points
+    start = np.tile(guess, (count, 1))
+    found = solve_limb(chain, target, "auto", start, IkSettings(), (count,), nearest=False)
+    cause = _causes(chain, found)
+    good = cause == REACHABLE
+    inverse = np.full(count, np.nan)
+    inverse[good] = _inverse_condition(chain, found.best[good], target[good], length)
+    return cause, np.where(good[:, None], found.best, np.nan), inverse
+
+
+def _compiled(
+    robot: Robot, chain: Chain, points: Array, guess: Array, length: float
+) -> tuple[Array, Array, Array]:
+    """As ``_found`` by the limb's kernel; what that leaves open is found by the solvers."""
+    told = run(limb_map(robot, chain.limb, tuple(guess.tolist()), length), {"point": points})
+    cause, q, inverse = told["cause"][:, 0].astype(np.int16), told["q"], told["inverse"][:, 0]
+    sure = told["sure"] > 0
+    lost = cause != REACHABLE
+    q[lost], inverse[lost] = np.nan, np.nan
+    again = np.flatnonzero(sure[:, 0] & ~sure[:, 1] & ~lost)
+    target = np.tile(as_array(chain.tip).astype(float), (len(again), 1, 1))
+    target[:, :3, 3] = points[again]
+    inverse[again] = _inverse_condition(chain, q[again], target, length)
+    for part in _blocks(np.flatnonzero(~sure[:, 0])):
+        cause[part], q[part], inverse[part] = _found(chain, points[part], guess, length)
+    return cause, q, inverse
+
+
+def _blocks(samples: Array) -> list[Array]:
+    return [samples[i : i + BLOCK] for i in range(0, len(samples), BLOCK)]
 
 
 def _cause_names(chain: Chain) -> tuple[str, ...]:

@@ -37,6 +37,8 @@ ERROR = 1e-10
 """Error of a solution [m and rad, norm], over the inverse condition number, that is still exact to rounding."""
 INSIDE, OUTSIDE = 50.0, -50.0
 """Above and below these stand the keys of branches inside the limits, and of those that are no solutions."""
+FAR = 40.0
+"""An angle beyond all others [rad]; a joint without limits lies so far inside."""
 LIMITS = 2.0
 """Cause from which limits are told, two for every joint."""
 
@@ -97,7 +99,7 @@ def _judged(chain: Chain, branch: Sequence[Scalar], near: Sequence[tuple[Scalar,
     """A branch (angles, slack) against the limits and the sines and cosines of the guess."""
     *angles, slack = branch
     q = wrapped(chain, angles)
-    beyond: Scalar = -math.inf
+    beyond: Scalar = -FAR
     limit: Scalar = LIMITS
     for joint, x in enumerate(q):
         here, upper = _beyond(chain, joint, x)
@@ -115,7 +117,7 @@ def _beyond(chain: Chain, joint: int, x: Scalar) -> tuple[Scalar, Scalar]:
     """How far an angle lies beyond the limits of its joint, negative inside; and if beyond the upper one."""
     low, high = float(chain.lower[joint]), float(chain.upper[joint])
     if math.isinf(low):
-        return (x - high, True) if math.isfinite(high) else (-math.inf, False)
+        return (x - high, True) if math.isfinite(high) else (-FAR, False)
     if math.isinf(high):
         return low - x, False
     middle = (low + high) / 2
@@ -140,8 +142,8 @@ def _chosen(branches: Sequence[_Branch]) -> tuple[_Branch, Scalar]:
 
 def _decided(chain: Chain, best: _Branch) -> Scalar:
     """Condition: if limits cut the best branch off, one of them is clearly the worst."""
-    first: Scalar = -math.inf
-    second: Scalar = -math.inf
+    first: Scalar = -FAR
+    second: Scalar = -FAR
     for joint, x in enumerate(best.q):
         here, _ = _beyond(chain, joint, x)
         second = _larger(second, where(here > first, first, here))
