@@ -12,6 +12,7 @@ from screwkin.errors import InputError
 from screwkin.gait.balance import sole_corners
 from screwkin.gait.plan import Plan
 from screwkin.gait.stance import LEFT, RIGHT, Foot, Hand, Stance
+from screwkin.kernel.blocks import least_values
 from screwkin.kernel.body import follows, motion
 from screwkin.kernel.pose import solve_pose_fast
 from screwkin.kernel.records import identifier
@@ -37,7 +38,6 @@ from screwkin.solve.rates import (
     block_names,
     secondary_accelerations,
     secondary_rates,
-    singular_values,
 )
 from screwkin.solve.singularity import refuse_singular
 
@@ -129,13 +129,16 @@ def _turns(mechanism: Mechanism, tip: str) -> bool:
 def differentiate(mechanism: Mechanism, made: Plan, state: State) -> Motion:
     """Rates and accelerations of the joints from those of the plan, through N and its derivative."""
     q, T = unstack(state.q), pose_from_array(made.T_world_base)
-    twists = coupling_twists(mechanism, T.R, q)
-    N = network_matrix(mechanism, twists, (len(made.time),))
     if len(made.time) >= FROM and follows(robot := mechanism.robot, mechanism.secondary):
         qd, qdd = _compiled_motion(robot, made, state.q)
-        found = SecondarySolution(qd, singular_values(mechanism, N), block_names(mechanism))
-        refuse_singular(mechanism, N, found, made.time)
-        return Motion(state.q, qd, qdd, found.sigma, found.blocks)
+        sigma = least_values(mechanism, made.T_world_base, state.q)
+        found = SecondarySolution(qd, sigma, block_names(mechanism))
+        if found.singular.any():
+            twists = coupling_twists(mechanism, T.R, q)
+            refuse_singular(mechanism, network_matrix(mechanism, twists, (len(made.time),)), found, made.time)
+        return Motion(state.q, qd, qdd, sigma, found.blocks)
+    twists = coupling_twists(mechanism, T.R, q)
+    N = network_matrix(mechanism, twists, (len(made.time),))
     first, second = _imposed(made, 0), _imposed(made, 1)
     order, batch = mechanism.primary, (len(made.time),)
     rates = primary_motion(mechanism, T, q, first)
