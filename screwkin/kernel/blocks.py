@@ -16,7 +16,7 @@ from screwkin.mechanism.network import coupling_twists, network_matrix
 from screwkin.model.robot import Robot
 from screwkin.scalar import Scalar, where
 from screwkin.se3 import UNTURNED, Twist, pose_from_array, unstack
-from screwkin.solve.conditioning import TRUSTED, extreme_singular_values
+from screwkin.solve.conditioning import TRUSTED, least_singular_value
 from screwkin.solve.rates import singular_values
 
 Array = Any
@@ -81,9 +81,9 @@ def block_values(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, .
         block = [
             [int(sign) * x for sign in signs[:, c] for x in _weighed(twists[c], length)] for c in columns
         ]
-        found.append(extreme_singular_values(block))
-    recorder.output("least", [values.least for values in found])
-    recorder.output("sure", [where(values.error <= TRUSTED, 1.0, 0.0) for values in found])
+        found.append(least_singular_value(block))
+    recorder.output("least", [value for value, _ in found])
+    recorder.output("sure", [where(error <= TRUSTED, 1.0, 0.0) for _, error in found])
     return recorder.program()
 
 
