@@ -34,7 +34,7 @@ ALIKE = 1e-9
 WELL = 1e-3
 """Inverse condition number below which the sample is left to algorithms that polish their solutions."""
 ERROR = 1e-10
-"""Error of a solution [m and rad, norm], over the inverse condition number, that is still exact to rounding."""
+"""Error of a solution [m and rad, norm], over the inverse condition number, that counts as rounding."""
 INSIDE, OUTSIDE = 50.0, -50.0
 """Above and below these stand the keys of branches inside the limits, and of those that are no solutions."""
 FAR = 40.0
@@ -163,7 +163,8 @@ def _conditioning(
         twist = Screw(moved.s, moved.s0 - tip, moved.pitch).twist
         columns.append([*twist.omega, *(x / length for x in twist.v)])
     here, there = seen[-1].R, seen[0].R @ target.R
-    turn = sum(dot(a - b, a - b) for a, b in zip((here.x, here.y, here.z), (there.x, there.y, there.z)))
+    axes = zip((here.x, here.y, here.z), (there.x, there.y, there.z), strict=True)
+    turn = sum(dot(a - b, a - b) for a, b in axes)
     return extreme_singular_values(columns), scalar.sqrt(turn * 0.5 + dot(tip - wanted, tip - wanted))
 
 

@@ -26,7 +26,7 @@ STEPS = 4
 ROUNDING = 1e-15
 """Relative error of the polynomial's coefficients and of its value, in what all terms add up to."""
 TRUSTED = 5e-13
-"""Error bound up to which the formula is taken; beyond it, an algorithm that iterates until it has arrived."""
+"""Error bound up to which the formula is taken; beyond it, an algorithm that iterates to the end."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ def extreme_singular_values(columns: Sequence[Sequence[Scalar]]) -> Extremes:
     for block in _blocks(columns):
         sums = symmetric_functions(*two_diagonals(block))
         (low, low_error), (high, high_error) = _outermost(sums, 1), _outermost(sums, -1)
-        part = Extremes(root(low), root(high), _larger(low_error, high_error))
+        part = Extremes(root(low), root(high), plus(low_error, high_error))
         found = part if found is None else _joined(found, part)
     assert found is not None
     return found
@@ -71,16 +71,16 @@ def least_singular_value(columns: Sequence[Sequence[Scalar]]) -> tuple[Scalar, S
         found.append((root(low), error))
     value, error = found[0]
     for other, its_error in found[1:]:
-        value, error = least(value, other), _larger(error, its_error)
+        value, error = least(value, other), plus(error, its_error)
     return value, error
 
 
 def _joined(a: Extremes, b: Extremes) -> Extremes:
-    return Extremes(least(a.least, b.least), _larger(a.largest, b.largest), _larger(a.error, b.error))
+    return Extremes(least(a.least, b.least), _larger(a.largest, b.largest), plus(a.error, b.error))
 
 
 def _blocks(columns: Sequence[Sequence[Scalar]]) -> list[list[list[Scalar]]]:
-    """Columns of the square parts into which exact zeros divide a matrix; all of it if they are not square."""
+    """Columns of the square parts into which exact zeros divide a matrix; all of it if not all are square."""
     support = [_support(column) for column in columns]
     pattern = np.array([[row in rows for rows in support] for row in range(len(columns))], dtype=np.int64)
     parts = components(pattern)
@@ -176,7 +176,7 @@ def _outermost(sums: Sequence[Scalar], side: int) -> tuple[Scalar, Scalar]:
         last, (value, slope, bend) = y, _taylor(powers, y)
         step = _laguerre(value, slope, bend, n, sign)
         y = last - step
-    size = _taylor(powers, -last)[0]
+    size = _taylor(powers, abs_(last))[0]
     inverse = _inverse(last * slope)
     gap, change = abs_(size * inverse), abs_(step * slope * inverse)
     near = change * gap
