@@ -34,8 +34,9 @@ LEVELS = (0.745, 0.80, 0.86, 0.915, 0.985)
 REACHABLE, OUT_OF_REACH = 0, 1
 BLOCK = 4096
 """Points solved together, so that intermediate arrays stay in the processor's cache."""
-LARGE_BLOCK = 131_072
-"""Points that a kernel computes together: it keeps to the cache by itself, and shares them among cores."""
+LARGE_BLOCK = 524_288
+"""Points that a kernel computes together: it keeps to the cache by itself and shares them among cores; the
+solvers, whose calls cost much, then take all that it leaves open at once."""
 LARGEST_GRID = 2_000_000
 
 
