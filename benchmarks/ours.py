@@ -58,9 +58,9 @@ def _rate_kernels(robot: Robot, given: Motion) -> Contestants:
     compiled = machine_code(program)
     if compiled is not None:
         alone = replace(compiled, cores=1)
-        contestants[f"{NAME}, C kernel, one core"] = Contestant(lambda: alone(flat, filled), result)
+        contestants[f"{NAME}, C kernel, one core"] = Contestant(alone.bound(flat, filled), result)
         if count >= THREADED_FROM:
-            contestants[f"{NAME}, C kernel, all cores"] = Contestant(lambda: compiled(flat, filled), result)
+            contestants[f"{NAME}, C kernel, all cores"] = Contestant(compiled.bound(flat, filled), result)
     if count == 1:
         function, sample = python_function(program), [array[0].tolist() for array in flat]
 
@@ -71,21 +71,25 @@ def _rate_kernels(robot: Robot, given: Motion) -> Contestants:
         contestants[f"{NAME}, generated Python"] = Contestant(lambda: function(*sample), told_once)
         return contestants
     contestants[f"{NAME}, NumPy kernel"] = Contestant(lambda: run_numpy(program, flat, filled), result)
-    return contestants | {f"{NAME}, JAX kernel": _jax(program, flat)}
+    from screwkin.kernel import emit_jax, xla_call
+
+    contestants[f"{NAME}, JAX fused by XLA, all cores"] = _jax(program, flat, emit_jax.function(program))
+    contestants[f"{NAME}, JAX calling machine code, all cores"] = _jax(
+        program, flat, xla_call.function(program)
+    )
+    return contestants
 
 
-def _jax(program: Program, flat: list[Array]) -> Contestant:
-    """The program in JAX, the batch last, compiled beforehand."""
+def _jax(program: Program, flat: list[Array], function: Any) -> Contestant:
+    """The program in JAX, the batch last, compiled beforehand; as many threads as JAX was given."""
     import jax
-
-    from screwkin.kernel.emit_jax import function
 
     with jax.enable_x64(True):
         arrays = [
             jax.numpy.asarray(a.T.reshape(*g.shape, len(a)))
             for a, g in zip(flat, program.inputs, strict=True)
         ]
-        compiled = jax.jit(function(program)).lower(*arrays).compile()
+        compiled = jax.jit(function).lower(*arrays).compile()
 
     def result(found: Any) -> Result:
         poses, qd, _ = (np.moveaxis(np.asarray(x), -1, 0) for x in found)

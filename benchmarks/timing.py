@@ -68,9 +68,9 @@ def interleaved(runs: Mapping[str, Run], rounds: int, budget: float = 60.0) -> d
 def _measured(run: Run, times: int) -> Elapsed:
     """Time per call of several calls in a row."""
     cpu_before, before = time.process_time(), time.perf_counter()
-    returned = [run() for _ in range(times)]
+    # Results are let go at once, so that their memory serves again.
+    told = [value for _ in range(times) if isinstance(value := run(), Elapsed)]
     wall, cpu = time.perf_counter() - before, time.process_time() - cpu_before
-    told = [value for value in returned if isinstance(value, Elapsed)]
     if told:
         wall, cpu = sum(value.wall for value in told), sum(value.cpu for value in told)
     return Elapsed(wall / times, cpu / times)

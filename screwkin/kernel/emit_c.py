@@ -59,7 +59,9 @@ def _prototype(program: Program) -> str:
 
 
 def _number(x: float) -> str:
-    return f"R({x!r})"
+    if math.isfinite(x):
+        return f"R({x!r})"
+    return "R(NAN)" if math.isnan(x) else "R(INFINITY)" if x > 0 else "R(-INFINITY)"
 
 
 def _horner(coefficients: Sequence[float], variable: str) -> str:
@@ -115,7 +117,7 @@ INLINE real angle(real y, real x)
 
 def _function(program: Program) -> str:
     name, read = program.name, _read(program)
-    inputs = [group for group in program.inputs if group.name in read]
+    inputs = inputs_read(program)
     groups = [*inputs, *program.outputs]
     takes = [f"const real *restrict {g.name}" for g in inputs]
     takes += [f"real *restrict {g.name}" for g in program.outputs]
@@ -159,6 +161,12 @@ static void {name}_lanes({arguments})
     }}
 }}
 """
+
+
+def inputs_read(program: Program) -> list[Group]:
+    """The inputs of which the program reads a scalar."""
+    read = _read(program)
+    return [group for group in program.inputs if group.name in read]
 
 
 def _read(program: Program) -> dict[str, list[int]]:
