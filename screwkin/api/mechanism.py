@@ -7,10 +7,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from screwkin.api.arrays import Array, checked, parts, rigid, twist_of
+from screwkin.api.arrays import Array, checked, compiles, parts, rigid, twist_of
 from screwkin.api.body import home
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.kernel.pose import solve_pose_fast
+from screwkin.kernel.secondary import secondary_rates as kernel_rates
 from screwkin.mechanism import network
 from screwkin.mechanism import virtual_motion as virtual
 from screwkin.mechanism.mechanism import Mechanism
@@ -102,15 +103,38 @@ def secondary_rates(
     Source: paper A, eq. 10-11.
     """
     primary = checked("primary_rates", primary_rates, len(mechanism.primary))
+    if on_singular not in ("raise", "status"):
+        raise InputError(f"on_singular is {on_singular!r}; valid: raise, status")
+    fast = _by_program(mechanism, state, primary)
+    if fast is not None:
+        return (fast, _status(np.zeros((), dtype=bool), fast.shape[:-1])) if on_singular == "status" else fast
     N = network_matrix(mechanism, state)
     solution = rates.secondary_rates(mechanism, N, primary)
     singular = solution.singular
     if on_singular == "status":
         return solution.values, _status(singular.any(axis=-1), solution.values.shape[:-1])
-    if on_singular != "raise":
-        raise InputError(f"on_singular is {on_singular!r}; valid: raise, status")
     refuse_singular(mechanism, N, solution)
     return solution.values
+
+
+def _by_program(mechanism: Mechanism, state: State, primary: Array) -> Array | None:
+    """Secondary rates of a large batch without singular sample by the kernel; None where that is not so."""
+    if is_jax(primary):
+        return None
+    T, q = np.asarray(state.T_world_base), np.asarray(state.q)
+    try:
+        batch = np.broadcast_shapes(T.shape[:-2], q.shape[:-1], primary.shape[:-1])
+    except ValueError:
+        return None
+    if not compiles(state, batch):
+        return None
+    parts(mechanism.robot, state)
+    flat = (
+        np.broadcast_to(a, (*batch, *a.shape[a.ndim - inner :])).reshape(-1, *a.shape[a.ndim - inner :])
+        for a, inner in ((T, 2), (q, 1), (primary, 1))
+    )
+    values = kernel_rates(mechanism, *flat)
+    return None if values is None else values.reshape(*batch, -1)
 
 
 def _status(singular: Array, batch: tuple[int, ...]) -> Array:

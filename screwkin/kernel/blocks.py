@@ -36,7 +36,7 @@ def least_values(mechanism: Mechanism, T_world_base: Array, q: Array) -> Array:
     Returns:
         (B, blocks), velocities divided by ``characteristic_length``.
     """
-    if any(6 * len(circuits) != len(own) or len(own) > LARGEST for circuits, own in mechanism.blocks):
+    if not small(mechanism):
         return _by_lapack(mechanism, T_world_base, q)
     program = block_values(mechanism.robot, mechanism.primary, mechanism.secondary)
     found = run(program, {"T_world_base": T_world_base, "q": q})
@@ -61,9 +61,7 @@ def block_values(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, .
         primary: names of the imposed couplings, as in ``Mechanism.primary``.
         secondary: names of those that follow.
     """
-    chains = virtual_chains(robot)
-    graph = coupling_graph(robot, chains)
-    mechanism = Mechanism(robot, chains, graph, primary, secondary, len(primary))
+    mechanism = mechanism_of(robot, primary, secondary)
     recorder = Recorder(
         identifier(robot.name, "regular"),
         f"Least singular value of the screws of every block of {robot.name} that follows, velocities over"
@@ -85,6 +83,17 @@ def block_values(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, .
     recorder.output("least", [value for value, _ in found])
     recorder.output("sure", [where(error <= TRUSTED, 1.0, 0.0) for _, error in found])
     return recorder.program()
+
+
+def mechanism_of(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, ...]) -> Mechanism:
+    """The mechanism of a robot with a choice that has been checked."""
+    chains = virtual_chains(robot)
+    return Mechanism(robot, chains, coupling_graph(robot, chains), primary, secondary, len(primary))
+
+
+def small(mechanism: Mechanism) -> bool:
+    """True if all blocks are square and small: programs take them on."""
+    return all(6 * len(circuits) == len(own) <= LARGEST for circuits, own in mechanism.blocks)
 
 
 def _weighed(twist: Twist, length: float) -> list[Scalar]:
