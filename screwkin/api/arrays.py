@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from screwkin.errors import ShapeError
+from screwkin.kernel.rigid import deviation
 from screwkin.kernel.run import FROM
 from screwkin.model.robot import Robot
-from screwkin.model.state import State, not_rigid
+from screwkin.model.state import RIGID, State, not_rigid
 from screwkin.scalar import is_jax
 from screwkin.se3 import NO_TWIST, Pose, Twist, pose_from_array, twist_from_array, unstack
 
@@ -46,7 +47,10 @@ def rigid(name: str, T: Array) -> Array:
     Raises:
         ShapeError: a matrix is no rigid displacement.
     """
-    if not is_jax(T) and (bad := not_rigid(T)).any():
+    if is_jax(T):
+        return T
+    bad = not_rigid(T) if T.size < 16 * FROM else deviation(T) > RIGID
+    if bad.any():
         sample = tuple(int(i) for i in np.argwhere(bad)[0])
         raise ShapeError(
             f"{name} is not a rigid pose{f' in sample {sample}' if sample else ''}: expected an orthonormal, "

@@ -10,14 +10,13 @@ from screwkin.api.arrays import Array, checked
 from screwkin.errors import InputError, ShapeError
 from screwkin.kernel.branches import limb_solutions
 from screwkin.kernel.limbs import solvable
+from screwkin.kernel.rigid import nearest_poses
 from screwkin.kernel.run import FROM
 from screwkin.model.robot import Robot
+from screwkin.model.state import RIGID
 from screwkin.solve.branches import LimbSolutions
 from screwkin.solve.chain import Chain
 from screwkin.solve.ik import IkSettings, Method, solve_limb
-
-RIGID = 1e-6
-"""Largest error of a rotation matrix that counts as rounding."""
 
 
 def limb_ik(
@@ -87,21 +86,25 @@ def rigid(T: Array) -> Array:
     Raises:
         InputError: a matrix is no pose.
     """
-    R = T[..., :3, :3]
-    wrong = np.abs(R.swapaxes(-1, -2) @ R - np.eye(3)).max(axis=(-1, -2), initial=0.0)
-    wrong = np.maximum(wrong, np.abs(T[..., 3, :] - [0, 0, 0, 1]).max(axis=-1, initial=0.0))
-    wrong = np.where(np.linalg.det(R) > 0, wrong, np.inf)
+    wrong, exact = nearest_poses(T) if T.size >= 16 * FROM else _nearest(T)
     if wrong.size and wrong.max() > RIGID:
         sample = int(wrong.argmax())
         raise InputError(
             f"T_base_tip, sample {sample}, is no pose: its upper left 3 x 3 must be a rotation and its last "
             "row 0 0 0 1"
         )
+    return exact
+
+
+def _nearest(T: Array) -> tuple[Array, Array]:
+    """As ``kernel.rigid.nearest_poses``."""
+    R = T[..., :3, :3]
+    wrong = np.abs(R.swapaxes(-1, -2) @ R - np.eye(3)).max(axis=(-1, -2), initial=0.0)
+    wrong = np.maximum(wrong, np.abs(T[..., 3, :] - [0, 0, 0, 1]).max(axis=-1, initial=0.0))
     exact = T.copy()
     for _ in range(2):
-        # Newton's step to the nearest rotation; it squares the error.
         exact[..., :3, :3] = R = 1.5 * R - 0.5 * R @ R.swapaxes(-1, -2) @ R
-    return exact
+    return np.where(np.linalg.det(T[..., :3, :3]) > 0, wrong, np.inf), exact
 
 
 def _default_guess(robot: Robot, chain: Chain) -> Array:

@@ -1,17 +1,18 @@
-"""All branches of a limb's closed form by its program; what is in doubt is left to ``solve.closed``."""
+"""All solutions of a limb by its program; what is in doubt is left to ``solve.closed``."""
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
-from screwkin.kernel.limbs import DOUBT, limb_branches
+from screwkin.kernel.limbs import limb_branches
 from screwkin.kernel.run import run
 from screwkin.model.robot import Robot
 from screwkin.solve.branches import LimbSolutions, ordered
 from screwkin.solve.chain import Chain
-from screwkin.solve.closed import EXACT, closed_form, solve_closed
+from screwkin.solve.closed import closed_form, solve_closed
 
 Array = Any
 
@@ -21,14 +22,23 @@ def limb_solutions(
 ) -> LimbSolutions:
     """As ``solve.ik.solve_limb`` with method "closed", for tip poses (B, 4, 4) and guesses (B, n)."""
     chain = Chain.of(robot, limb)
-    found = run(limb_branches(robot, limb), {"T_base_tip": target})
-    q, error, slack = found["q"], found["error"], found["slack"]
-    with np.errstate(invalid="ignore"):
-        valid = error <= EXACT
-        clear = np.where(slack > 0, valid, ~valid) & (np.abs(slack) > DOUBT)
-    again = np.flatnonzero(~(clear.all(axis=1) & valid.any(axis=1)))
+    found = run(limb_branches(robot, limb), {"T_base_tip": target, "guess": guess})
+    kind, error = found["kind"], found["error"]
+    steps = np.ones(kind.shape, dtype=int)
+    program = LimbSolutions(
+        chain.limb, chain.names, "closed", found["q"], kind > 0.5, kind > 1.5, error, steps
+    )
+    again = np.flatnonzero(found["sure"][:, 0] < 0.5)
     if len(again):
         form = closed_form(chain)
-        part = solve_closed(form, target[again], guess[again], least_squares)
-        q[again], error[again], valid[again] = part
-    return ordered(chain, "closed", q, valid, error, np.ones(error.shape, dtype=int), guess, batch)
+        q, left, valid = solve_closed(form, target[again], guess[again], least_squares)
+        told = ordered(chain, "closed", q, valid, left, steps[again], guess[again], (len(again),))
+        for name in ("q", "valid", "in_limits", "residual"):
+            getattr(program, name)[again] = getattr(told, name)
+    return _shaped(program, batch)
+
+
+def _shaped(flat: LimbSolutions, batch: tuple[int, ...]) -> LimbSolutions:
+    told = {field.name: getattr(flat, field.name) for field in fields(flat)}
+    arrays = {name: a.reshape(*batch, *a.shape[1:]) for name, a in told.items() if isinstance(a, np.ndarray)}
+    return LimbSolutions(**(told | arrays))

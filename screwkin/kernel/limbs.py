@@ -19,14 +19,19 @@ from screwkin.scalar import Scalar, where
 from screwkin.screw import AT_REST, Screw, advance, carry
 from screwkin.se3 import NO_TWIST, UNTURNED, ZERO, Pose, Vector, dot
 from screwkin.solve.chain import Chain
-from screwkin.solve.closed import closed_form
+from screwkin.solve.closed import EXACT, closed_form
 from screwkin.solve.limb_motion import seen_from
-from screwkin.solve.limb_rates import point_rates, pose_rates, split_of
+from screwkin.solve.limb_rates import doubtful, point_rates, pose_rates, split_of
 from screwkin.solve.point_limb import point_branches, shoulder_of
+from screwkin.solve.pose import CLOSED, SINGULAR
 from screwkin.solve.quartic import abs_
 
 DOUBT = 1e-8
 """Slack of a branch below which it is left to the algorithms that keep their digits there."""
+WITHIN = 1e-9
+"""Excess over a limit that counts as rounding, as in ``Chain.within``."""
+FARTHER = 100.0
+"""More than the nearness of two branches can differ."""
 FOUND = (
     "found: 1 if there is a solution, 0 if there is none (then q is the guess), -1 if rounding leaves it open"
 )
@@ -34,21 +39,60 @@ FOUND = (
 
 @cache
 def limb_branches(robot: Robot, limb: str) -> Program:
-    """All branches of a limb's closed form, and how far each is from the target pose."""
+    """All solutions of a limb's closed form, in the order of ``solve.branches.ordered``."""
     chain = Chain.of(robot, limb)
     recorder = Recorder(
         identifier(robot.name, chain.limb, "ik"),
-        f"All branches of {chain.limb} of {robot.name} for poses of its tip in the base frame; error: what"
-        " lacks to the pose [m and rad, norm]; slack: how far inside reach, in doubt near 0.",
+        f"All solutions of {chain.limb} of {robot.name} for a pose of its tip in the base frame: inside the"
+        " limits first, then the nearest to a guess; NaN where there is none. error: what lacks to the pose"
+        " [m and rad, norm]; kind: 2 inside the limits, 1 outside, 0 none; sure: 1 if rounding leaves nothing"
+        " open.",
     )
-    target = pose_input(recorder, "T_base_tip")
-    branches = closed_form(chain).formula(target)
-    recorder.output(
-        "q", [x for *q, _ in branches for x in wrapped(chain, q)], len(branches), len(chain.names)
-    )
-    recorder.output("error", [gap(chain, q, target) for *q, _ in branches])
-    recorder.output("slack", [slack for *_, slack in branches])
+    target, guess = pose_input(recorder, "T_base_tip"), recorder.input("guess", len(chain.names))
+    near, rows, sure = [(scalar.sin(x), scalar.cos(x)) for x in guess], [], 1.0
+    for *q, slack in closed_form(chain).formula(target):
+        q, error = wrapped(chain, q), gap(chain, q, target)
+        solves = error <= EXACT
+        sure = where(((slack > DOUBT) & solves) | ((slack < -DOUBT) & ~solves), sure, 0.0)
+        kind = where(solves, where(excess(chain, q)[0] <= WITHIN, 2.0, 1.0), 0.0)
+        apart = sum(1.0 - cosine for cosine in _cosines(q, near))
+        none = kind < 0.5
+        shown = [where(none, math.nan, x) for x in q]
+        rows.append([apart - FARTHER * kind, kind, where(none, math.inf, error), *shown])
+    rows = _sorted(rows)
+    recorder.output("q", [x for _, _, _, *q in rows for x in q], len(rows), len(chain.names))
+    recorder.output("error", [error for _, _, error, *_ in rows])
+    recorder.output("kind", [kind for _, kind, *_ in rows])
+    recorder.output("sure", [where(rows[0][1] > 0.5, sure, 0.0)])
     return recorder.program()
+
+
+def _sorted(rows: Sequence[list[Scalar]]) -> list[list[Scalar]]:
+    """The rows by their first scalar; equal ones keep their order, as neighbours only change places."""
+    rows = list(rows)
+    for last in range(1, len(rows)):
+        for k in range(last, 0, -1):
+            a, b = rows[k - 1], rows[k]
+            swap = b[0] < a[0]
+            rows[k - 1] = [where(swap, y, x) for x, y in zip(a, b, strict=True)]
+            rows[k] = [where(swap, x, y) for x, y in zip(a, b, strict=True)]
+    return rows
+
+
+def _cosines(q: Sequence[Scalar], near: Sequence[tuple[Scalar, Scalar]]) -> list[Scalar]:
+    """Cosines of the angles' differences from others that are told by sine and cosine."""
+    return [scalar.sin(x) * s + scalar.cos(x) * c for x, (s, c) in zip(q, near, strict=True)]
+
+
+def excess(chain: Chain, q: Sequence[Scalar]) -> tuple[Scalar, Scalar]:
+    """How far the joint furthest beyond its limits lies, below 0 inside; and its index in the robot."""
+    joints = chain.joints
+    worst, index = -math.inf, float(joints[0])
+    for k, (x, low, high) in enumerate(zip(q, chain.lower.tolist(), chain.upper.tolist(), strict=True)):
+        for here in [low - x] * math.isfinite(low) + [x - high] * math.isfinite(high):
+            more = here > worst
+            worst, index = where(more, here, worst), where(more, float(joints[k]), index)
+    return worst, index
 
 
 @cache
@@ -92,12 +136,13 @@ def whole_body(robot: Robot, targets: tuple[tuple[str, bool], ...]) -> Program:
     recorder = Recorder(
         identifier(robot.name, "pose"),
         f"Joint positions of {robot.name} nearest to a guess that put base and tips where they are wanted,"
-        f" world frame; error: what lacks to each target [m and rad, norm]; {FOUND}; determinant of each"
-        " limb's screws.",
+        " world frame; for each target error: what lacks to it [m and rad, norm]; beyond: how far the joint"
+        " furthest beyond its limits lies, below 0 inside; worst: its index; sure: 1 if rounding leaves"
+        " nothing open.",
     )
     T, guess = pose_input(recorder, "T_world_base"), recorder.input("guess", len(robot.joints))
     back, q = T.inverse, list(guess)
-    errors, founds, determinants = [], [], []
+    told: dict[str, list[Scalar]] = {"error": [], "beyond": [], "worst": [], "sure": []}
     for tip, pose in targets:
         chain = Chain.of(robot, tip)
         name = identifier(tip)
@@ -112,13 +157,14 @@ def whole_body(robot: Robot, targets: tuple[tuple[str, bool], ...]) -> Program:
         own, found = nearest_branch(chain, branches, [guess[i] for i in chain.joints])
         for i, x in zip(chain.joints, own, strict=True):
             q[i] = x
-        errors.append(gap(chain, own, target, pose))
-        founds.append(found)
-        determinants.append(limb_determinant(robot, chain, own))
+        error, (beyond, worst) = gap(chain, own, target, pose), excess(chain, own)
+        regular = abs_(limb_determinant(robot, chain, own)) > doubtful(chain, SINGULAR)
+        sure = (found > 0.5) & (error <= CLOSED * 1e-2) & regular
+        for values, value in zip(told.values(), (error, beyond, worst, where(sure, 1.0, 0.0)), strict=True):
+            values.append(value)
     recorder.output("q", q)
-    recorder.output("error", errors)
-    recorder.output("found", founds)
-    recorder.output("determinant", determinants)
+    for group, values in told.items():
+        recorder.output(group, values)
     return recorder.program()
 
 
@@ -134,7 +180,7 @@ def nearest_branch(
     rival: Scalar = -50.0
     for *q, slack in branches:
         pairs = [(scalar.sin(x), scalar.cos(x)) for x in q]
-        alike = sum(s * t + c * d for (s, c), (t, d) in zip(pairs, near, strict=True))
+        alike = sum(_cosines(q, near))
         here = [where(slack > DOUBT, alike, -100.0), *(x for pair in pairs for x in pair)]
         rival = where((abs_(slack) <= DOUBT) & (alike > rival), alike, rival)
         better = here[0] > best[0]

@@ -12,9 +12,8 @@ from screwkin.kernel.records import identifier
 from screwkin.kernel.run import FROM, run
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
-from screwkin.solve.chain import Chain
-from screwkin.solve.limb_rates import doubtful
-from screwkin.solve.pose import CLOSED, SINGULAR, PoseSolution, judged, solve_pose
+from screwkin.solve.pose import PoseSolution, solve_pose
+from screwkin.solve.status import Status
 
 Array = Any
 
@@ -38,12 +37,18 @@ def solve_pose_fast(robot: Robot, targets: Mapping[str, Array], guess: State) ->
     inputs = {"T_world_base": base, "guess": guess.q}
     inputs |= {identifier(name): targets[name] for name, _ in told}
     found = run(limbs.whole_body(robot, told), inputs)
-    chains = [Chain.of(robot, name) for name, _ in told]
-    least = np.array([doubtful(chain, SINGULAR) for chain in chains])
-    sure = (found["found"] == 1) & (found["error"] <= CLOSED * 1e-2) & (np.abs(found["determinant"]) > least)
-    q, error, batch = found["q"], found["error"], found["q"].shape[:-1]
-    solution = judged(robot, tuple(name for name, _ in told), base, q, error)
-    again = np.flatnonzero(~sure.all(axis=-1).reshape(-1))
+    error, batch = found["error"], found["q"].shape[:-1]
+    solution = PoseSolution(
+        State(np.broadcast_to(base, (*batch, 4, 4)), found["q"]),
+        tuple(robot.limb(name).name for name, _ in told),
+        np.where(found["beyond"] > limbs.WITHIN, Status.OUT_OF_LIMITS, Status.CONVERGED),
+        error,
+        error,
+        np.zeros_like(error),
+        np.ones(error.shape, dtype=int),
+        found["worst"].astype(int),
+    )
+    again = np.flatnonzero((found["sure"] < 0.5).any(axis=-1))
     if not len(again):
         return solution
     picked = {name: _picked(x, batch, again, _inner(x)) for name, x in targets.items()}

@@ -26,7 +26,7 @@ FROM = 1000
 """Samples from which callers make programs at all; for fewer, running the formulas themselves is quicker."""
 PYTHON_UP_TO = 16
 """Samples up to which a loop of generated Python is faster than NumPy's calls."""
-COMPILE_FROM = 50_000
+COMPILE_FROM = 10_000
 """Samples from which a program that was never compiled here is compiled: some seconds, once and for all."""
 
 

@@ -199,33 +199,6 @@ def solve_pose(robot: Robot, targets: Mapping[str, Array], guess: State) -> Pose
     )
 
 
-def judged(robot: Robot, tips: Sequence[str], base: Array, q: Array, error: Array) -> PoseSolution:
-    """The solution of positions q (..., n) found in closed form with errors (..., tips): limits are asked.
-
-    Args:
-        robot: the robot.
-        tips: names of the tips with a target.
-        base: pose of the base, broadcast to the batch.
-        q: joint positions.
-        error: what lacks to every target [m and rad, norm].
-    """
-    batch, limbs = q.shape[:-1], [robot.limb(name) for name in tips]
-    flat, shape = q.reshape(-1, q.shape[-1]), (int(np.prod(batch)), len(limbs))
-    parts = {"status": np.full(shape, Status.CONVERGED), "worst_joint": np.zeros(shape, dtype=int)}
-    for row, limb in enumerate(limbs):
-        _judge(robot, row, list(robot.path_to(limb.link)), flat, parts)
-    return PoseSolution(
-        State(np.broadcast_to(base, (*batch, 4, 4)), q),
-        tuple(limb.name for limb in limbs),
-        parts["status"].reshape(error.shape).astype(int),
-        error,
-        error,
-        np.zeros_like(error),
-        np.ones(error.shape, dtype=int),
-        parts["worst_joint"].reshape(error.shape),
-    )
-
-
 def _in_base(T: Array, target: Array, batch: tuple[int, ...]) -> Array:
     """A world target, flat batch, in the base frame: nothing depends on where the robot stands."""
     if target.shape[-2:] == (4, 4):

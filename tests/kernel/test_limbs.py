@@ -32,7 +32,11 @@ def test_a_large_batch_has_the_branches_flags_and_order_of_small_ones(name, limb
         np.testing.assert_array_equal(
             getattr(large, field), np.concatenate([getattr(p, field) for p in parts])
         )
-    np.testing.assert_allclose(large.best[40:], np.concatenate([p.best for p in parts])[40:], atol=1e-7)
+    # Where branches are equally near to the guess rounding decides which comes first.
+    q, few = large.q[40:], np.concatenate([p.q for p in parts])[40:]
+    alike = np.isclose(q, few, atol=1e-7, equal_nan=True).all(axis=(1, 2))
+    assert alike.mean() > 0.998
+    np.testing.assert_allclose(large.best[40:], few[:, 0], atol=1e-7)
     assert large.residual[40:, 0].max() <= 1e-12
     assert (large.status[:40] == sk.solve.status.Status.UNREACHABLE).all()
 
