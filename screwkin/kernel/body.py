@@ -5,7 +5,7 @@ Each runs the public formulas once on graph scalars and is a ``Program`` with na
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 
 from screwkin.dynamics.newton_euler import GRAVITY, Bodies, ground_wrench, momentum
@@ -24,22 +24,20 @@ from screwkin.solve.limb_motion import LimbMotion
 @cache
 def tip_poses(robot: Robot) -> Program:
     """World poses of all tips."""
-    recorder = Recorder(identifier(robot.name, "tips"), f"World poses of the tips of {robot.name}.")
-    T, q = pose_input(recorder, "T_world_base"), recorder.input("q", len(robot.joints))
-    D = positions.link_displacements(robot, q)
-    poses = [T @ positions.frame_pose(robot, D, limb.tip) for limb in robot.limbs]
-    recorder.output("T_world_tip", [x for pose in poses for x in matrix(pose)], len(poses), 4, 4)
-    return recorder.program()
+    return _poses(robot, "tip", lambda D: [positions.frame_pose(robot, D, limb.tip) for limb in robot.limbs])
 
 
 @cache
 def link_poses(robot: Robot) -> Program:
     """World poses of all links."""
-    recorder = Recorder(identifier(robot.name, "links"), f"World poses of the links of {robot.name}.")
+    return _poses(robot, "link", lambda D: [d @ x.frame for d, x in zip(D, robot.links, strict=True)])
+
+
+def _poses(robot: Robot, what: str, of: Callable[[Sequence[Displacement]], list[Pose]]) -> Program:
+    recorder = Recorder(identifier(robot.name, f"{what}s"), f"World poses of the {what}s of {robot.name}.")
     T, q = pose_input(recorder, "T_world_base"), recorder.input("q", len(robot.joints))
-    D = positions.link_displacements(robot, q)
-    poses = [T @ (d @ link.frame) for d, link in zip(D, robot.links, strict=True)]
-    recorder.output("T_world_link", [x for pose in poses for x in matrix(pose)], len(poses), 4, 4)
+    poses = [T @ pose for pose in of(positions.link_displacements(robot, q))]
+    recorder.output(f"T_world_{what}", [x for pose in poses for x in matrix(pose)], len(poses), 4, 4)
     return recorder.program()
 
 

@@ -16,11 +16,11 @@ from screwkin.kernel.program import Program, Recorder
 from screwkin.kernel.records import identifier, pose_input
 from screwkin.model.robot import Robot
 from screwkin.scalar import Scalar, where
-from screwkin.screw import AT_REST, Screw, advance, carry
+from screwkin.screw import AT_REST, advance
 from screwkin.se3 import NO_TWIST, UNTURNED, ZERO, Pose, Vector, dot
 from screwkin.solve.chain import Chain
 from screwkin.solve.closed import EXACT, closed_form
-from screwkin.solve.limb_motion import seen_from
+from screwkin.solve.limb_motion import seen_screws
 from screwkin.solve.limb_rates import doubtful, point_rates, pose_rates, split_of
 from screwkin.solve.point_limb import point_branches, shoulder_of
 from screwkin.solve.pose import CLOSED, SINGULAR
@@ -221,13 +221,7 @@ def gap(chain: Chain, q: Sequence[Scalar], target: Pose, pose: bool = True) -> S
 def limb_determinant(robot: Robot, chain: Chain, q: Sequence[Scalar]) -> Scalar:
     """Determinant of a limb's screws, with velocities divided by its length (see ``solve.limb_rates``)."""
     split = split_of(chain)
-    seen = seen_from(chain.screws, q, best_link(robot, chain.limb))
-    if len(chain.screws) == 3:
-        point = seen[-1] @ chain.tip.p
-    else:
-        point = seen[split.first] @ split.point if split else seen[0] @ chain.screws[0].s0
-    screws = [carry(d, screw) for d, screw in zip(seen, chain.screws, strict=False)]
-    twists = [Screw(s.s, s.s0 - point, s.pitch).twist for s in screws]
+    twists = seen_screws(chain, split, q, best_link(robot, chain.limb))
     if len(twists) == 3:
         return point_rates(twists, ZERO, chain.length)[1]
     return pose_rates(twists, split, NO_TWIST, chain.length)[1]

@@ -11,7 +11,6 @@ import os
 import platform
 import shutil
 import subprocess
-import tempfile
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -20,6 +19,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from screwkin.errors import OutputError
+from screwkin.files import atomic_path
 from screwkin.kernel import emit_c
 from screwkin.kernel.program import Program
 
@@ -126,7 +127,7 @@ def shared(text: str, name: str, flags: tuple[str, ...] = ()) -> Any:
         if not library.exists():
             _build(text, [cc, *FLAGS, *flags], library)
         return ctypes.CDLL(str(library))[name]
-    except (OSError, AttributeError, subprocess.SubprocessError):
+    except (OSError, OutputError, AttributeError, subprocess.SubprocessError):
         return None
 
 
@@ -162,10 +163,6 @@ def _library(text: str, cc: str, flags: tuple[str, ...]) -> Path:
 def _build(text: str, command: Sequence[str], library: Path) -> None:
     """Compile beside, then rename: two processes may do so at once."""
     library.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-    with tempfile.TemporaryDirectory(dir=library.parent) as folder:
-        source, made = Path(folder) / "kernel.c", Path(folder) / "kernel.so"
-        source.write_text(text, encoding="utf-8")
-        subprocess.run(
-            [*command, "-o", str(made), str(source), "-lm"], check=True, capture_output=True, timeout=300
-        )
-        made.replace(library)
+    with atomic_path(library) as beside:
+        told = [*command, "-x", "c", "-o", str(beside), "-", "-lm"]
+        subprocess.run(told, input=text, text=True, check=True, capture_output=True, timeout=300)

@@ -6,16 +6,14 @@ generated Python for a few samples, machine code for more where a C compiler is 
 
 from __future__ import annotations
 
-import hashlib
 import importlib.util
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
+from screwkin.files import atomic_path
 from screwkin.kernel import emit_python, native
 from screwkin.kernel.program import Program
 
@@ -106,13 +104,11 @@ def python_function(program: Program) -> Callable[..., Sequence[list[float]]]:
     The module is written to the cache folder and imported from there.
     """
     text = emit_python.source(program)
-    file = native.cache_folder() / f"{program.name}_{hashlib.sha256(text.encode()).hexdigest()[:16]}.py"
+    file = native.cache_folder() / f"{program.name}_{native.digest(text)[:16]}.py"
     if not file.exists():
         file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-        with tempfile.TemporaryDirectory(dir=file.parent) as folder:
-            made = Path(folder) / "kernel.py"
-            made.write_text(text, encoding="utf-8")
-            made.replace(file)
+        with atomic_path(file) as beside:
+            beside.write_text(text, encoding="utf-8")
     spec = importlib.util.spec_from_file_location(f"screwkin_kernel_{program.name}", file)
     assert spec is not None
     assert spec.loader is not None

@@ -101,28 +101,6 @@ def solve_limb(
     )
 
 
-def closed_positions(chain: Chain, target: Array, guess: Array) -> tuple[Array, Array]:
-    """The exact branch nearest to a guess: for whole-body solvers, in place of or before their iterations.
-
-    Args:
-        chain: a limb with a closed form.
-        target: tip poses (B, 4, 4) in the base frame.
-        guess: (B, n).
-
-    Returns:
-        q (B, n), the guess itself where there is no solution; solved (B,) bool. Limits are not asked, so that
-        a limb which moves steadily keeps its branch.
-
-    Raises:
-        InputError: the limb has no closed form.
-    """
-    q, _, valid = solve_closed(closed_form(chain), target, guess, least_squares=False)
-    apart = np.where(valid, np.linalg.norm(np.sin((q - guess[:, None]) / 2), axis=-1), np.inf)
-    best = np.take_along_axis(q, apart.argmin(axis=1)[:, None, None], axis=1)[:, 0]
-    solved = valid.any(axis=1)
-    return np.where(solved[:, None], best, guess), solved
-
-
 def _has_closed_form(chain: Chain) -> bool:
     try:
         closed_form(chain)

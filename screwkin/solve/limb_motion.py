@@ -57,16 +57,10 @@ class LimbMotion:
         split, path = split_of(chain), chain.joints
         carried = dict(zip(robot.link_names, D, strict=True))
         links = [robot.joints[path[0]].parent, *(robot.joints[i].child for i in path)]
-        seen = seen_from(chain.screws, [q[i] for i in path], joints)
+        link, fixed = told_at(chain, split)
+        point = carried[links[link]] @ fixed
+        told = seen_screws(chain, split, [q[i] for i in path], joints)
         tip = frame_pose(robot, D, limb.tip)
-        if len(path) == 6:
-            at_joint = split.first if split else 0
-            fixed = split.point if split else chain.screws[0].s0
-            point, here = carried[links[at_joint]] @ fixed, seen[at_joint] @ fixed
-        else:
-            point, here = tip.p, seen[-1] @ limb.frame.p
-        screws = [carry(d, screw) for d, screw in zip(seen, chain.screws, strict=False)]
-        told = tuple(Screw(s.s, s.s0 - here, s.pitch).twist for s in screws)
         return cls(path, split, chain.length, tip, point, carried[links[joints]].R, told)
 
     def _turned(self, omega: Vector, v: Vector) -> Twist:
@@ -112,6 +106,25 @@ class LimbMotion:
             back = self.axes.T
             wanted = Twist(known.omega, back @ tip_rate.v - cross(V.omega, V.v))
         return self._solved(wanted - known)[0]
+
+
+def told_at(chain: Chain, split: Split | None) -> tuple[int, Vector]:
+    """Where a limb's screws are told: after how many joints the link that bears the point, and the point.
+
+    The split's point, else the first axis of six joints, and the tip of three; zero pose.
+    """
+    if len(chain.screws) == 3:
+        return 3, chain.tip.p
+    return (split.first, split.point) if split else (0, chain.screws[0].s0)
+
+
+def seen_screws(chain: Chain, split: Split | None, q: Sequence[Scalar], joints: int) -> tuple[Twist, ...]:
+    """A limb's screws at ``told_at``, in the axes of the link after that many joints."""
+    seen = seen_from(chain.screws, q, joints)
+    link, fixed = told_at(chain, split)
+    here = seen[link] @ fixed
+    screws = [carry(d, screw) for d, screw in zip(seen, chain.screws, strict=False)]
+    return tuple(Screw(s.s, s.s0 - here, s.pitch).twist for s in screws)
 
 
 def seen_from(screws: Sequence[Screw], q: Sequence[Scalar], joints: int) -> list[Displacement]:

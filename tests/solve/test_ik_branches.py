@@ -11,7 +11,7 @@ from screwkin.errors import InputError
 from screwkin.model.table import load_robot
 from screwkin.solve.branches import BEYOND, LimbSolutions, ordered
 from screwkin.solve.chain import Chain
-from screwkin.solve.ik import IkSettings, closed_positions, solve_limb
+from screwkin.solve.ik import IkSettings, solve_limb
 from screwkin.solve.status import Status
 from tests.solve.legs import Floats, Leg, apart, offset_leg, spherical_leg
 
@@ -109,19 +109,6 @@ def test_branches_inside_the_limits_come_first_then_the_nearest_to_the_guess() -
     assert found.residual[7, 0] == residual[7, 0]
     assert found.status[7] == Status.UNREACHABLE
     assert (found.status[rest] == Status.CONVERGED).all()
-
-
-def test_the_branch_nearest_to_a_guess_is_it_or_the_guess_itself() -> None:
-    leg = offset_leg()
-    rng = np.random.default_rng(8)
-    q = rng.uniform(-2.0, 2.0, (200, 6))
-    target = leg.reach(q)
-    target[::10, 2, 3] += 2.0
-    guess = q + rng.uniform(-1e-3, 1e-3, q.shape)
-    found, solved = closed_positions(leg.chain(), target, guess)
-    np.testing.assert_array_equal(solved, np.arange(200) % 10 != 0)
-    np.testing.assert_array_equal(found[~solved], guess[~solved])
-    assert apart(found[solved], q[solved]).max() < 1e-6
 
 
 def test_an_angle_is_given_by_the_turn_that_its_limits_ask_for() -> None:
