@@ -85,6 +85,46 @@ def _prelude() -> str:
 #define INLINE static inline
 #endif
 
+/* Between rows, sample after sample, and a tile, scalar after scalar: two by two, with vectors of two where
+   there are such, which halves the loads and stores. */
+#if defined(__SSE2__) || defined(__aarch64__)
+typedef real pair __attribute__((vector_size(2 * sizeof(real)), aligned(sizeof(real)), may_alias));
+#define TURN(from, below, to, under) \\
+    const pair a = *(const pair *)(from), b = *(const pair *)(below); \\
+    *(pair *)(to) = (pair){{a[0], b[0]}}, *(pair *)(under) = (pair){{a[1], b[1]}};
+#else
+#define TURN(from, below, to, under) \\
+    (to)[0] = (from)[0], (to)[1] = (below)[0], (under)[0] = (from)[1], (under)[1] = (below)[1];
+#endif
+
+INLINE void take(real *restrict tile, const real *restrict rows, size_t size, size_t used, size_t count)
+{{
+    size_t k = 0;
+    for (; count == TILE && k + 1 < used; k += 2)
+        for (size_t i = 0; i < TILE; i += 2) {{
+            const real *row = rows + i * size + k;
+            real *column = tile + k * TILE + i;
+            TURN(row, row + size, column, column + TILE)
+        }}
+    for (; k < used; ++k)
+        for (size_t i = 0; i < TILE; ++i)
+            tile[k * TILE + i] = rows[(i < count ? i : count - 1) * size + k];
+}}
+
+INLINE void give(real *restrict rows, const real *restrict tile, size_t size, size_t count)
+{{
+    size_t k = 0;
+    for (; count == TILE && k + 1 < size; k += 2)
+        for (size_t i = 0; i < TILE; i += 2) {{
+            const real *column = tile + k * TILE + i;
+            real *row = rows + i * size + k;
+            TURN(column, column + TILE, row, row + size)
+        }}
+    for (; k < size; ++k)
+        for (size_t i = 0; i < count; ++i)
+            rows[i * size + k] = tile[k * TILE + i];
+}}
+
 /* Sine and cosine: the angle less whole quarter turns, then two polynomials. */
 INLINE void sine_cosine(real x, real *s, real *c)
 {{
@@ -127,8 +167,13 @@ def _function(program: Program) -> str:
     lane = ", ".join(f"{g.name} + i" for g in groups)
     spare = "".join(f"    (void){g.name};\n" for g in program.inputs if g.name not in read)
     buffers = "\n".join(f"    real {g.name}_tile[{g.size} * TILE];" for g in groups)
-    loads = "\n".join(_load(g, read[g.name]) for g in inputs)
-    stores = "\n".join(_store(g) for g in program.outputs)
+    loads = "\n".join(
+        f"        take({g.name}_tile, {g.name} + first * {g.size}, {g.size}, {max(read[g.name]) + 1}, count);"
+        for g in inputs
+    )
+    stores = "\n".join(
+        f"        give({g.name} + first * {g.size}, {g.name}_tile, {g.size}, count);" for g in program.outputs
+    )
     return f"""INLINE void {name}_sample({arguments}, const size_t w)
 {{
 {body}
@@ -149,15 +194,9 @@ static void {name}_lanes({arguments})
     }}
     for (size_t first = 0; first < samples; first += TILE) {{
         const size_t count = samples - first < TILE ? samples - first : TILE;
-        for (size_t i = 0; i < TILE; ++i) {{
-            const size_t at = first + (i < count ? i : count - 1);
 {loads}
-        }}
         {name}_lanes({tile});
-        for (size_t i = 0; i < count; ++i) {{
-            const size_t at = first + i;
 {stores}
-        }}
     }}
 }}
 """
@@ -180,25 +219,6 @@ def _read(program: Program) -> dict[str, list[int]]:
             read[group.name] = here
         at += group.size
     return read
-
-
-def _load(group: Group, scalars: Sequence[int]) -> str:
-    if len(scalars) == group.size:
-        return (
-            f"            for (size_t k = 0; k < {group.size}; ++k)\n"
-            f"                {group.name}_tile[k * TILE + i] = {group.name}[at * {group.size} + k];"
-        )
-    return "\n".join(
-        f"            {group.name}_tile[{k} * TILE + i] = {group.name}[at * {group.size} + {k}];"
-        for k in scalars
-    )
-
-
-def _store(group: Group) -> str:
-    return (
-        f"            for (size_t k = 0; k < {group.size}; ++k)\n"
-        f"                {group.name}[at * {group.size} + k] = {group.name}_tile[k * TILE + i];"
-    )
 
 
 def _statements(program: Program) -> list[str]:
