@@ -73,26 +73,27 @@ def _rate_kernels(robot: Robot, given: Motion) -> Contestants:
     contestants[f"{NAME}, NumPy kernel"] = Contestant(lambda: run_numpy(program, flat, filled), result)
     from screwkin.kernel import emit_jax, xla_call
 
-    contestants[f"{NAME}, JAX fused by XLA, all cores"] = _jax(program, flat, emit_jax.function(program))
-    contestants[f"{NAME}, JAX calling machine code, all cores"] = _jax(
-        program, flat, xla_call.function(program)
+    fused, called = (
+        _jax(program, flat, made, first)
+        for made, first in ((emit_jax.function(program), False), (xla_call.function(program), True))
     )
-    return contestants
+    return contestants | {
+        f"{NAME}, JAX fused by XLA, all cores": fused,
+        f"{NAME}, JAX calling machine code, all cores": called,
+    }
 
 
-def _jax(program: Program, flat: list[Array], function: Any) -> Contestant:
-    """The program in JAX, the batch last, compiled beforehand; as many threads as JAX was given."""
+def _jax(program: Program, flat: list[Array], function: Any, first: bool) -> Contestant:
+    """The program in JAX, compiled beforehand, the batch first or last; as many threads as JAX was given."""
     import jax
 
     with jax.enable_x64(True):
-        arrays = [
-            jax.numpy.asarray(a.T.reshape(*g.shape, len(a)))
-            for a, g in zip(flat, program.inputs, strict=True)
-        ]
+        shaped = [a.reshape(len(a), *g.shape) for a, g in zip(flat, program.inputs, strict=True)]
+        arrays = [jax.numpy.asarray(a if first else np.moveaxis(a, 0, -1).copy()) for a in shaped]
         compiled = jax.jit(function).lower(*arrays).compile()
 
     def result(found: Any) -> Result:
-        poses, qd, _ = (np.moveaxis(np.asarray(x), -1, 0) for x in found)
+        poses, qd, _ = (np.asarray(x) if first else np.moveaxis(np.asarray(x), -1, 0) for x in found)
         return {"poses": poses, "rates": qd}
 
     return Contestant(lambda: jax.block_until_ready(compiled(*arrays)), result)

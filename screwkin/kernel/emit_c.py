@@ -157,7 +157,7 @@ INLINE real angle(real y, real x)
 
 def _function(program: Program) -> str:
     name, read = program.name, _read(program)
-    inputs = inputs_read(program)
+    inputs = [group for group in program.inputs if group.name in read]
     groups = [*inputs, *program.outputs]
     takes = [f"const real *restrict {g.name}" for g in inputs]
     takes += [f"real *restrict {g.name}" for g in program.outputs]
@@ -200,12 +200,6 @@ static void {name}_lanes({arguments})
     }}
 }}
 """
-
-
-def inputs_read(program: Program) -> list[Group]:
-    """The inputs of which the program reads a scalar."""
-    read = _read(program)
-    return [group for group in program.inputs if group.name in read]
 
 
 def _read(program: Program) -> dict[str, list[int]]:

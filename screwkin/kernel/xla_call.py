@@ -26,29 +26,21 @@ Array = Any
 
 @cache
 def function(program: Program) -> Callable[..., tuple[Array, ...]]:
-    """As ``emit_jax.function``, by machine code where the arrays are float64 on a processor that has it.
+    """The program as a function of its inputs, arrays (*batch, *shape), to its outputs, likewise.
 
-    Inputs (*shape, *batch) to outputs, likewise; ``jax.jit`` it. Differentiable in both modes, and ``vmap``
-    adds its axis to the batch. Without a C compiler it is ``emit_jax.function`` itself.
+    Machine code where the arrays are float64 on a processor that has it, ``emit_jax.function`` elsewhere.
+    ``jax.jit`` it; it is differentiable in both modes and goes through ``vmap``.
     """
-    plain = emit_jax.function(program)
+    plain = _batch_first(program)
     target = _target(program) if native.compiler() else None
     if target is None:
         return plain
+    inner = [len(group.shape) for group in program.inputs]
 
-    @jax.custom_batching.custom_vmap
     def call(*inputs: Array) -> tuple[Array, ...]:
-        batch = inputs[0].shape[len(program.inputs[0].shape) :]
-        told = [jax.ShapeDtypeStruct((*g.shape, *batch), np.float64) for g in program.outputs]
-        return tuple(jax.ffi.ffi_call(target, told)(*inputs))
-
-    @call.def_vmap
-    def _(size: int, mapped: list[bool], *inputs: Array) -> tuple[tuple[Array, ...], tuple[bool, ...]]:
-        last = [
-            jnp.moveaxis(x, 0, -1) if along else jnp.broadcast_to(x[..., None], (*x.shape, size))
-            for x, along in zip(inputs, mapped, strict=True)
-        ]
-        return tuple(jnp.moveaxis(x, -1, 0) for x in call(*last)), (True,) * len(program.outputs)
+        batch = inputs[0].shape[: inputs[0].ndim - inner[0]]
+        told = [jax.ShapeDtypeStruct((*batch, *group.shape), np.float64) for group in program.outputs]
+        return tuple(jax.ffi.ffi_call(target, told, vmap_method="broadcast_all")(*inputs))
 
     @jax.custom_jvp
     def compute(*inputs: Array) -> tuple[Array, ...]:
@@ -61,13 +53,35 @@ def function(program: Program) -> Callable[..., tuple[Array, ...]]:
     def chosen(*inputs: Array) -> tuple[Array, ...]:
         if any(jnp.result_type(x) != np.float64 for x in inputs):
             return plain(*inputs)
-        inner = [len(g.shape) for g in program.inputs]
-        batch = jnp.broadcast_shapes(*(x.shape[n:] for x, n in zip(inputs, inner, strict=True)))
-        told = [jnp.broadcast_to(x, (*x.shape[:n], *batch)) for x, n in zip(inputs, inner, strict=True)]
+        batch = jnp.broadcast_shapes(*(x.shape[: x.ndim - n] for x, n in zip(inputs, inner, strict=True)))
+        told = [
+            jnp.broadcast_to(x, (*batch, *group.shape))
+            for x, group in zip(inputs, program.inputs, strict=True)
+        ]
         return compute(*told)
 
     chosen.__name__ = program.name
     return chosen
+
+
+def _batch_first(program: Program) -> Callable[..., tuple[Array, ...]]:
+    """``emit_jax.function`` with the batch in front."""
+    last = emit_jax.function(program)
+
+    def compute(*inputs: Array) -> tuple[Array, ...]:
+        inner = [len(group.shape) for group in program.inputs]
+        batch = jnp.broadcast_shapes(*(x.shape[: x.ndim - n] for x, n in zip(inputs, inner, strict=True)))
+        told = []
+        for x, group in zip(inputs, program.inputs, strict=True):
+            whole = jnp.broadcast_to(x, (*batch, *group.shape)).reshape(-1, *group.shape)
+            told.append(jnp.moveaxis(whole, 0, -1))
+        return tuple(
+            jnp.moveaxis(x, -1, 0).reshape(*batch, *group.shape)
+            for x, group in zip(last(*told), program.outputs, strict=True)
+        )
+
+    compute.__name__ = program.name
+    return compute
 
 
 @cache
@@ -94,30 +108,19 @@ _HANDLER = (Path(__file__).parent / "xla_handler.c").read_text(encoding="utf-8")
 
 
 def _definitions(program: Program) -> str:
-    """What the handler must know of the program: sizes, and its function over tiles as one of all scalars."""
-    read = {group.name for group in emit_c.inputs_read(program)}
-    tiles, at = [], 0
-    for group in program.inputs:
-        if group.name in read:
-            tiles.append(f"(in) + {at} * TILE")
-        at += group.size
-    arity, at = at, 0
-    for group in program.outputs:
-        tiles.append(f"(out) + {at} * TILE")
-        at += group.size
+    """What the handler must know of the program."""
 
     def sizes(groups: Sequence[Group]) -> str:
         return "{" + ", ".join(str(group.size) for group in groups) + "}"
 
+    arrays = [f"(in)[{k}]" for k in range(len(program.inputs))]
+    arrays += [f"(out)[{k}]" for k in range(len(program.outputs))]
     told = {
         "INPUTS": len(program.inputs),
         "OUTPUTS": len(program.outputs),
         "SIZES_IN": sizes(program.inputs),
         "SIZES_OUT": sizes(program.outputs),
-        "ALL_IN": arity,
-        "ALL_OUT": at,
-        "INNER": len(program.outputs[0].shape),
-        "COLUMNS(in, out)": f"{program.name}_lanes({', '.join(tiles)})",
+        "PROGRAM(samples, in, out)": f"{program.name}(samples, {', '.join(arrays)})",
         "HANDLER": f"{program.name}_xla",
     }
     return "\n".join(f"#define {name} {value}" for name, value in told.items())

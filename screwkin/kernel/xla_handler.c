@@ -1,13 +1,11 @@
-/* XLA's handler around a program in C. The arrays hold scalar after scalar, the batch last; large batches are
-   shared among the threads of XLA's own pool. It stands below the program's source and these definitions:
-   INPUTS, OUTPUTS   how many arrays
-   SIZES_IN, _OUT    scalars a sample of each, ALL_IN and ALL_OUT of all
-   INNER             dimensions of the first output before the batch
-   COLUMNS(in, out)  the program for a tile of samples
-   HANDLER           the handler's name */
+/* XLA's handler around a program in C; large batches are shared among the threads of XLA's own pool. It stands
+   below the program's source and these definitions:
+   INPUTS, OUTPUTS              how many arrays
+   SIZES_IN, SIZES_OUT          scalars a sample of each
+   PROGRAM(samples, in, out)    the program's function, its arrays shifted
+   HANDLER                      the handler's name */
 
 #include <stdlib.h>
-#include <string.h>
 #include "xla/ffi/api/c_api.h"
 
 #define SHARE 2048 /* samples worth a thread of their own */
@@ -20,7 +18,6 @@ typedef struct {
 } Part;
 
 struct Job {
-    size_t samples;
     const real *in[INPUTS];
     real *out[OUTPUTS];
     const XLA_FFI_Api *api;
@@ -31,26 +28,14 @@ struct Job {
 
 static void compute(const Job *job, size_t begin, size_t end)
 {
-    static const size_t in[] = SIZES_IN, out[] = SIZES_OUT;
-    real tiles_in[ALL_IN * TILE], tiles_out[ALL_OUT * TILE];
-    for (size_t first = begin; first < end; first += TILE) {
-        const size_t count = end - first < TILE ? end - first : TILE;
-        real *tile = tiles_in;
-        for (size_t g = 0; g < INPUTS; ++g)
-            for (size_t k = 0; k < in[g]; ++k, tile += TILE) {
-                const real *row = job->in[g] + k * job->samples + first;
-                if (count == TILE)
-                    memcpy(tile, row, TILE * sizeof(real));
-                else
-                    for (size_t i = 0; i < TILE; ++i)
-                        tile[i] = row[i < count ? i : count - 1];
-            }
-        COLUMNS(tiles_in, tiles_out);
-        tile = tiles_out;
-        for (size_t g = 0; g < OUTPUTS; ++g)
-            for (size_t k = 0; k < out[g]; ++k, tile += TILE)
-                memcpy(job->out[g] + k * job->samples + first, tile, count * sizeof(real));
-    }
+    static const size_t sizes_in[] = SIZES_IN, sizes_out[] = SIZES_OUT;
+    const real *in[INPUTS];
+    real *out[OUTPUTS];
+    for (size_t k = 0; k < INPUTS; ++k)
+        in[k] = job->in[k] + begin * sizes_in[k];
+    for (size_t k = 0; k < OUTPUTS; ++k)
+        out[k] = job->out[k] + begin * sizes_out[k];
+    PROGRAM(end - begin, in, out);
 }
 
 static void finish(void *data)
@@ -58,7 +43,8 @@ static void finish(void *data)
     Job *job = ((Part *)data)->job;
     compute(job, ((Part *)data)->begin, ((Part *)data)->end);
     if (__atomic_sub_fetch(&job->left, 1, __ATOMIC_ACQ_REL) == 0) {
-        XLA_FFI_Future_SetAvailable_Args done = {XLA_FFI_Future_SetAvailable_Args_STRUCT_SIZE, NULL, job->future};
+        XLA_FFI_Future_SetAvailable_Args done = {
+            XLA_FFI_Future_SetAvailable_Args_STRUCT_SIZE, NULL, job->future};
         job->api->XLA_FFI_Future_SetAvailable(&done);
         free(job);
     }
@@ -78,40 +64,43 @@ static size_t threads(const XLA_FFI_CallFrame *call)
     int64_t count = 1;
     XLA_FFI_ThreadPool_NumThreads_Args asked = {
         XLA_FFI_ThreadPool_NumThreads_Args_STRUCT_SIZE, NULL, call->ctx, &count};
-    return succeeded(call->api, call->api->XLA_FFI_ThreadPool_NumThreads(&asked)) && count > 1 ? (size_t)count : 1;
+    const int told = succeeded(call->api, call->api->XLA_FFI_ThreadPool_NumThreads(&asked));
+    return told && count > 1 ? (size_t)count : 1;
 }
 
 XLA_FFI_Error *HANDLER(XLA_FFI_CallFrame *call)
 {
+    static const size_t sizes[] = SIZES_OUT;
     if (call->extension_start && call->extension_start->type == XLA_FFI_Extension_Metadata) {
         XLA_FFI_Metadata *told = ((XLA_FFI_Metadata_Extension *)call->extension_start)->metadata;
         told->api_version.major_version = XLA_FFI_API_MAJOR;
         told->api_version.minor_version = XLA_FFI_API_MINOR;
         return NULL;
     }
-    Job one = {.samples = 1, .api = call->api};
+    Job one = {.api = call->api};
     for (size_t k = 0; k < INPUTS; ++k)
         one.in[k] = ((XLA_FFI_Buffer *)call->args.args[k])->data;
     for (size_t k = 0; k < OUTPUTS; ++k)
         one.out[k] = ((XLA_FFI_Buffer *)call->rets.rets[k])->data;
     const XLA_FFI_Buffer *first = call->rets.rets[0];
-    for (int64_t d = INNER; d < first->rank; ++d)
-        one.samples *= (size_t)first->dims[d];
-    const size_t worth = one.samples / SHARE, pool = worth > 1 ? threads(call) : 1;
+    size_t samples = 1;
+    for (int64_t d = 0; d < first->rank; ++d)
+        samples *= (size_t)first->dims[d];
+    samples /= sizes[0];
+    const size_t worth = samples / SHARE, pool = worth > 1 ? threads(call) : 1;
     const size_t parts = worth < pool ? worth : pool;
     XLA_FFI_Future_Create_Args made = {XLA_FFI_Future_Create_Args_STRUCT_SIZE, NULL, NULL};
     Job *job = parts > 1 ? malloc(sizeof(Job) + parts * sizeof(Part)) : NULL;
     if (!job || !succeeded(call->api, call->api->XLA_FFI_Future_Create(&made))) {
         free(job);
-        compute(&one, 0, one.samples);
+        compute(&one, 0, samples);
         return NULL;
     }
     *job = one;
     job->future = call->future = made.future;
     job->left = (int)parts;
     for (size_t k = 0; k < parts; ++k)
-        job->parts[k] = (Part){job, one.samples * k / parts / TILE * TILE,
-                               k + 1 < parts ? one.samples * (k + 1) / parts / TILE * TILE : one.samples};
+        job->parts[k] = (Part){job, samples * k / parts, samples * (k + 1) / parts};
     for (size_t k = 1; k < parts; ++k) {
         XLA_FFI_ThreadPool_Schedule_Args task = {
             XLA_FFI_ThreadPool_Schedule_Args_STRUCT_SIZE, NULL, call->ctx, finish, &job->parts[k]};
