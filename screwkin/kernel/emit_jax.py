@@ -1,8 +1,9 @@
 """Programs as JAX functions, the batch last: for any device, for gradients, and inside other JAX code.
 
-XLA fuses straight-line code well but computes what several outputs share anew for each of them. Sines and
-cosines, the dearest of it, are therefore taken of all angles at once, by the polynomials of ``series``, and
-kept behind a condition that XLA cannot see through.
+XLA fuses straight-line code well but computes what several results share anew for each of them, so that a
+thousand operations may become thirty thousand. On a CPU only a condition that is known at run time stops it.
+Sines and cosines, the dearest, are therefore taken of all angles at once, by the polynomials of ``series``,
+and kept behind one; and so is what every stage of some operations leaves to those after it.
 """
 
 from __future__ import annotations
@@ -20,6 +21,9 @@ from screwkin.kernel.series import ARC, COSINE, QUARTER_TURN, SINE
 
 Array = Any
 
+STAGE = 200
+"""Operations after which what later ones need is kept: fewer cost memory, more are computed anew."""
+
 
 def function(program: Program) -> Callable[..., tuple[Array, ...]]:
     """The program as a function of its inputs, arrays (*shape, *batch), to its outputs, likewise.
@@ -36,7 +40,8 @@ def function(program: Program) -> Callable[..., tuple[Array, ...]]:
             flat = x.reshape(group.size, *x.shape[len(group.shape) :])
             values += [flat[k] for k in range(group.size)]
         turned = _turned_inputs(program, values, batch)
-        for step in program.steps:
+        needed = _last_uses(program)
+        for k, step in enumerate(program.steps):
             operands = [values[x] if isinstance(x, int) else x for x in step.operands]
             if step.operation in ("sin", "cos"):
                 angle = step.operands[0]
@@ -45,6 +50,12 @@ def function(program: Program) -> Callable[..., tuple[Array, ...]]:
                 values.append(turned[angle][step.operation == "cos"])
             else:
                 values.append(_OPERATIONS[step.operation](*operands))
+            if (k + 1) % STAGE == 0:
+                made = range(len(values) - STAGE, len(values))
+                live = [v for v in made if needed[v] > k and values[v].dtype != bool]
+                kept = _kept(*(jnp.broadcast_to(values[v], batch) for v in live))
+                for v, row in zip(live, kept, strict=True):
+                    values[v] = row
         results = iter(program.results)
         outputs = []
         for group in program.outputs:
@@ -72,13 +83,39 @@ def _turned_inputs(
     if not angles:
         return {}
     s, c = sine_cosine(jnp.stack([jnp.broadcast_to(values[x], batch) for x in angles]))
-    s, c = _kept(jnp.isnan(s.ravel()[0]), s, c)
+    s, c = _kept(s, c)
     return {x: (s[k], c[k]) for k, x in enumerate(angles)}
 
 
-def _kept(condition: Array, *arrays: Array) -> tuple[Array, ...]:
-    """The arrays, materialised: XLA does not fuse through a condition that is known at run time only."""
-    return tuple(lax.cond(condition, lambda *x: tuple(2.0 * a for a in x), lambda *x: x, *arrays))
+def _last_uses(program: Program) -> list[int]:
+    """The last step that uses each value; beyond all steps for results, -1 for what is never used."""
+    last = [-1] * (program.arity + len(program.steps))
+    for k, step in enumerate(program.steps):
+        for x in step.operands:
+            if isinstance(x, int):
+                last[x] = k
+    for x in program.results:
+        if isinstance(x, int):
+            last[x] = len(program.steps)
+    return last
+
+
+def _kept(*arrays: Array) -> tuple[Array, ...]:
+    """The arrays, materialised: XLA does not fuse through a condition that is known at run time only.
+
+    Other devices wait for the host at every condition; theirs fuse with care and need only a hint.
+    """
+    if not arrays:
+        return ()
+
+    def condition(*x: Array) -> tuple[Array, ...]:
+        odd = jnp.isnan(x[0].ravel()[0])
+        return tuple(lax.cond(odd, lambda *y: tuple(2.0 * a for a in y), lambda *y: y, *x))
+
+    def hint(*x: Array) -> tuple[Array, ...]:
+        return tuple(lax.optimization_barrier(x))
+
+    return tuple(lax.platform_dependent(*arrays, cpu=condition, default=hint))
 
 
 def _row(values: Sequence[Array], result: int | float, batch: tuple[int, ...]) -> Array:
