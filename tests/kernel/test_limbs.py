@@ -11,6 +11,8 @@ from screwkin.kernel.run import run
 from screwkin.solve.chain import Chain
 from screwkin.solve.closed import closed_form, solve_closed
 from screwkin.solve.pose import solve_pose
+from tests.kernel.robots import with_leg
+from tests.solve.legs import backwards, random_parallel_leg, random_spherical_leg
 
 LEGS = (("bioloid", "left_leg"), ("bioloid", "right_leg"), ("poppy12", "left_leg"), ("poppy12", "right_leg"))
 
@@ -39,6 +41,43 @@ def test_a_large_batch_has_the_branches_flags_and_order_of_small_ones(name, limb
     np.testing.assert_allclose(large.best[40:], few[:, 0], atol=1e-7)
     assert large.residual[40:, 0].max() <= 1e-12
     assert (large.status[:40] == sk.solve.status.Status.UNREACHABLE).all()
+
+
+@pytest.mark.parametrize(
+    "leg",
+    [random_spherical_leg(11), random_parallel_leg(12), backwards(random_spherical_leg(13), 13)],
+    ids=["spherical", "parallel", "backwards"],
+)
+def test_legs_with_any_axes_have_the_solutions_and_flags_of_the_readable_path(leg):
+    robot = with_leg(leg, 6)
+    chain = Chain.of(robot, "left_leg")
+    q = np.zeros((1100, 12))
+    q[:, list(chain.joints)] = np.random.default_rng(3).uniform(-3, 3, (1100, 6))
+    T = sk.frame_pose(robot, sk.State(np.eye(4), q), "left_foot")
+    T[:100, :3, 3] += np.random.default_rng(4).normal(size=(100, 3))  # within reach or not
+    large = sk.limb_ik(robot, "left_leg", T, least_squares=False)
+    small = [sk.limb_ik(robot, "left_leg", T[i : i + 550], least_squares=False) for i in (0, 550)]
+    for field in ("valid", "in_limits", "status"):
+        told = np.concatenate([getattr(p, field) for p in small])
+        assert (getattr(large, field) == told).all(), field
+    few = np.concatenate([p.q for p in small])
+    alike = np.isclose(large.q, few, atol=1e-6, equal_nan=True).all(axis=(1, 2))
+    assert alike.mean() > 0.995  # branches equally near to the guess stand in either order
+    assert np.nanmax(np.where(large.valid, large.residual, np.nan)) <= 1e-11
+
+
+@pytest.mark.parametrize("beyond", [-1e-6, 0.0, 1e-10, 1e-8, 1e-6])
+def test_a_joint_at_its_limit_is_inside_to_a_billionth(beyond):
+    robot = sk.load_robot("bioloid")
+    q = np.tile(sk.home(robot).q, (1000, 1))
+    joint = robot.joint_names.index("left_hip_roll")
+    q[::2, joint] = robot.joints[joint].upper + beyond
+    T = sk.frame_pose(robot, sk.State(np.eye(4), q), "left_foot")
+    guess = q[:, list(Chain.of(robot, "left_leg").joints)]
+    found = sk.limb_ik(robot, "left_leg", T, guess=guess, least_squares=False)
+    same = np.abs(found.q[::2] - guess[::2, None]).max(axis=-1) < 1e-6
+    assert (same.sum(axis=1) == 1).all()
+    assert (found.in_limits[::2][same] == (beyond <= 1e-9)).all()
 
 
 @pytest.mark.parametrize(("name", "limb"), LEGS)

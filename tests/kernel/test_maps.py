@@ -11,8 +11,8 @@ import screwkin as sk
 from screwkin.analysis import workspace as maps
 from screwkin.kernel.maps import limb_map
 from screwkin.kernel.run import run
-from screwkin.se3 import pose_from_array
 from screwkin.solve.chain import Chain
+from tests.kernel.robots import with_leg
 from tests.solve.legs import backwards, random_parallel_leg, random_spherical_leg
 
 
@@ -39,21 +39,6 @@ def agree(robot, limb, points, surely=0.99):
     assert sure[:, 0].mean() >= surely
     assert sure[reached, 1].mean() >= surely
     return cause
-
-
-def with_leg(leg, seed):
-    """A bundled robot whose left leg has other screws, and limits at random."""
-    robot, rng = sk.load_robot("poppy12"), np.random.default_rng(seed)
-    path = robot.path_to(robot.limb("left_leg").link)
-    screws = dict(zip(path, leg.chain().screws, strict=True))
-    low, high = -rng.uniform(1.0, 4.0, 12), rng.uniform(1.0, 4.0, 12)
-    joints = tuple(
-        replace(joint, screw=screws[i], lower=low[i], upper=high[i]) if i in screws else joint
-        for i, joint in enumerate(robot.joints)
-    )
-    frame = pose_from_array(leg.tip)
-    limbs = tuple(replace(m, frame=frame) if m.name == "left_leg" else m for m in robot.limbs)
-    return replace(robot, joints=joints, limbs=limbs, postures=())
 
 
 @pytest.mark.parametrize(("name", "limb"), [("bioloid", "left_leg"), ("poppy12", "right_leg")])

@@ -13,7 +13,9 @@ from screwkin.mechanism.choice import RANK_TOLERANCE
 from screwkin.mechanism.network import coupling_twists, network_matrix
 from screwkin.se3 import pose_from_array, unstack
 from screwkin.solve import rates
+from tests.kernel.robots import with_leg
 from tests.kinematics.machines import random_state
+from tests.solve.legs import random_parallel_leg, random_spherical_leg
 
 
 def davies(mechanism, state, primary):
@@ -47,6 +49,20 @@ def test_rates_are_those_of_the_network_matrix(name, exchanged):
     least = run(followers(robot, mechanism.primary, mechanism.secondary), told)["least"]
     assert (least <= expected.sigma * (1 + 1e-9)).all()
     assert (least > RANK_TOLERANCE).all(axis=1).mean() > 0.95  # the program decides nearly all
+
+
+@pytest.mark.parametrize(
+    "leg", [random_spherical_leg(21), random_parallel_leg(22)], ids=["spherical", "parallel"]
+)
+def test_legs_with_any_axes_follow(leg):
+    robot = with_leg(leg, 7)
+    mechanism = sk.closed_mechanism(robot)
+    state = random_state(robot, 23, (300,))
+    primary = np.random.default_rng(24).uniform(-1, 1, (300, len(mechanism.primary)))
+    expected = davies(mechanism, state, primary)
+    found = secondary_rates(mechanism, state.T_world_base, state.q, primary)
+    size = np.abs(expected.values).max(axis=1, keepdims=True) / expected.sigma.min(axis=1, keepdims=True)
+    assert (np.abs(found - expected.values) <= 1e-12 * np.maximum(size, 1.0)).all()
 
 
 def test_large_batches_are_refused_and_marked_as_small_ones_are():
