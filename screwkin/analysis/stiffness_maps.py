@@ -21,7 +21,8 @@ from screwkin.model.robot import Robot
 from screwkin.model.state import State
 
 Array = Any
-BLOCK = 4096
+BLOCK = 65_536
+"""Points computed together, between two calls of ``progress``."""
 
 
 @dataclass(frozen=True, eq=False)

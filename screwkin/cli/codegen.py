@@ -10,14 +10,14 @@ from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, RobotName
 from screwkin.cli.output import print_json
 from screwkin.files import atomic_write
-from screwkin.kernel.codegen import c_files, programs_of
+from screwkin.kernel.codegen import KINDS, c_files, programs_of
 from screwkin.model.table import load_robot
 
 
 def codegen(
     robot: RobotName,
     what: Annotated[
-        str, typer.Option(metavar="KINDS", help="Of tips, com, rates, motion, zmp, ik, with commas between.")
+        str, typer.Option(metavar="KINDS", help=f"Of {', '.join(KINDS)}, with commas between.")
     ] = "ik,rates,zmp",
     single: Annotated[bool, typer.Option("--float", help="Numbers of type float, not double.")] = False,
     output: OutputFolder = None,

@@ -19,6 +19,8 @@ from screwkin.dynamics.newton_euler import GRAVITY
 from screwkin.dynamics.springs import StiffnessChoice, joint_stiffness
 from screwkin.dynamics.supported import Supported
 from screwkin.errors import InputError, NoSolutionError, ShapeError, SingularError, UnknownNameError
+from screwkin.kernel.run import FROM
+from screwkin.kernel.springs import equilibrium, first_order
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
@@ -30,6 +32,8 @@ Method = Literal["linear", "nonlinear"]
 
 SETTLED = 1e-12
 """Largest norm of theta + torque / k [rad or m] that counts as equilibrium."""
+BLOCK = 4096
+"""Samples of a large batch that the formulas compute together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,6 +119,28 @@ def static_deflection(
         raise InputError(f"unknown method {method!r}; valid: linear, nonlinear")
     k = joint_stiffness(robot, stiffness)
     T, q, batch = _flat(robot, state)
+    if len(q) < FROM:
+        found = _by_formulas(robot, support, T, q, k, gravity, method)
+    else:
+        found = _by_kernels(robot, support, T, q, k, gravity, method)
+    theta, base, change, residual, iterations, stable = found
+    return Deflection(
+        ("base", *robot.tip_names),
+        method,
+        theta.reshape(*batch, -1),
+        (-k * theta).reshape(*batch, -1),
+        State(base.reshape(*batch, 4, 4), (q + theta).reshape(*batch, -1)),
+        change.reshape(*batch, *change.shape[1:]),
+        residual.reshape(batch),
+        iterations.reshape(batch),
+        stable.reshape(batch),
+    )
+
+
+def _by_formulas(
+    robot: Robot, support: str, T: Array, q: Array, k: Array, gravity: float, method: Method
+) -> list[Array]:
+    """theta, base's poses, change, residual, iterations and stable: as of ``Deflection``, the batch flat."""
     stand = _support_pose(robot, T, q, support)
 
     def balance(theta: Array, samples: Array) -> tuple[Array, Array]:
@@ -132,17 +158,24 @@ def static_deflection(
         theta, slope = balance(theta, everyone)
         lack, _ = balance(theta, everyone)
     base, change = _yielded(robot, support, stand, q, theta, method)
-    return Deflection(
-        ("base", *robot.tip_names),
-        method,
-        theta.reshape(*batch, -1),
-        (-k * theta).reshape(*batch, -1),
-        State(base.reshape(*batch, 4, 4), (q + theta).reshape(*batch, -1)),
-        change.reshape(*batch, *change.shape[1:]),
-        np.linalg.norm(lack, axis=1).reshape(batch),
-        iterations.reshape(batch),
-        (np.linalg.eigvalsh(slope * k[:, None]).min(axis=1, initial=np.inf) > 0).reshape(batch),
-    )
+    stable = np.linalg.eigvalsh(slope * k[:, None]).min(axis=1, initial=np.inf) > 0
+    return [theta, base, change, np.linalg.norm(lack, axis=1), iterations, stable]
+
+
+def _by_kernels(
+    robot: Robot, support: str, T: Array, q: Array, k: Array, gravity: float, method: Method
+) -> list[Array]:
+    """The same of a large batch; samples that the kernels leave open are computed by the formulas."""
+    if method == "linear":
+        *found, sure = first_order(robot, support, T, q, k, gravity)
+    else:
+        *found, sure = equilibrium(robot, support, T, q, k, gravity, SETTLED / 10)
+    open_ = np.flatnonzero(~sure)
+    for rows in (open_[i : i + BLOCK] for i in range(0, len(open_), BLOCK)):
+        some = _by_formulas(robot, support, T[rows], q[rows], k, gravity, method)
+        for values, own in zip(found, some, strict=True):
+            values[rows] = own
+    return found
 
 
 def _yielded(

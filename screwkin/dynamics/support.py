@@ -7,6 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from screwkin.errors import InputError
+from screwkin.model.robot import Robot
+from screwkin.se3 import as_array
+
 Array = np.ndarray[Any, np.dtype[Any]]
 
 
@@ -16,6 +20,20 @@ class Spike:
 
     time: float
     distance: float
+
+
+def sole_corners(robot: Robot, foot: str) -> Array:
+    """Corners (k, 3) of a foot's sole in the frame of its tip [m].
+
+    Raises:
+        InputError: the table gives no sole for that limb.
+    """
+    limb = robot.limb(foot)
+    for sole in robot.soles:
+        if sole.limb == limb.name:
+            back = limb.frame.inverse
+            return np.asarray(as_array([back @ corner for corner in sole.corners]))
+    raise InputError(f"robot {robot.name}: limb {limb.name} has no [[sole]]; add one to check the ZMP")
 
 
 def convex_hull(points: Array) -> Array:
@@ -50,18 +68,24 @@ def support_margin(zmp: Array, soles: Array, contact: Array) -> Array:
         Margin [m], positive inside; -inf where no sole bears.
     """
     margin = np.full(len(zmp), -np.inf)
-    feet = contact.shape[1]
-    moved = np.zeros(len(zmp), dtype=bool)
-    for foot in range(feet):
-        # A sole that bears stands still, so one polygon serves until the contact or a bearing sole changes.
-        step = np.abs(np.diff(soles[:, foot], axis=0)).max(axis=(1, 2)) > 1e-9
-        moved[1:] |= (contact[1:, foot] != contact[:-1, foot]) | (step & contact[1:, foot])
-    starts = np.flatnonzero(np.concatenate([[True], moved[1:]]))
+    starts = polygon_starts(soles, contact)
     for begin, end in zip(starts, [*starts[1:], len(zmp)], strict=True):
         bearing = soles[begin, contact[begin]].reshape(-1, 2)
         if len(bearing):
             margin[begin:end] = signed_margin(zmp[begin:end], convex_hull(bearing))
     return margin
+
+
+def polygon_starts(soles: Array, contact: Array) -> Array:
+    """Samples from which another support polygon holds, the first included; arguments as above.
+
+    A sole that bears stands still, so one polygon serves until the contact or a bearing sole changes.
+    """
+    moved = np.zeros(len(contact), dtype=bool)
+    for foot in range(contact.shape[1]):
+        step = np.abs(np.diff(soles[:, foot], axis=0)).max(axis=(1, 2)) > 1e-9
+        moved[1:] |= (contact[1:, foot] != contact[:-1, foot]) | (step & contact[1:, foot])
+    return np.flatnonzero(np.concatenate([[True], moved[1:]]))
 
 
 def spikes(time: Array, gcom: Array, zmp: Array) -> tuple[Spike, ...]:

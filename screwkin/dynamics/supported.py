@@ -16,7 +16,7 @@ from screwkin.kinematics.positions import frame_pose, joint_twists, link_displac
 from screwkin.model.robot import Robot
 from screwkin.scalar import Scalar
 from screwkin.screw import Displacement, at
-from screwkin.se3 import ZERO, Pose, Twist, Vector, cross
+from screwkin.se3 import ZERO, Pose, Twist, Vector, Z, cross, dot
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,12 +28,14 @@ class Supported:
         support: ``base``, a link or a tip.
         base: T_world_base, which follows from the support's pose and q.
         displacements: of all links in the base frame.
+        up: direction against gravity, a unit vector in the axes of ``base``'s reference.
     """
 
     robot: Robot
     support: str
     base: Pose
     displacements: list[Displacement]
+    up: Vector = Z
 
     @classmethod
     def of(cls, robot: Robot, support: str, T_world_support: Pose, q: Sequence[Scalar]) -> Supported:
@@ -86,7 +88,7 @@ class Supported:
 
         It is the gradient of the potential energy: the power of all weights per unit rate of the joint.
         """
-        return [v.z * gravity for v in self.mass_velocities]
+        return [dot(self.up, v) * gravity for v in self.mass_velocities]
 
     def gravity_stiffness(self, gravity: float) -> dict[tuple[int, int], Scalar]:
         """Derivatives of the gravity torques (i, j), i <= j: the Hessian of the potential energy, symmetric.
@@ -96,6 +98,6 @@ class Supported:
         hessian: dict[tuple[int, int], Scalar] = {}
         for j, joint in enumerate(self.robot.joints):
             for i in self.path(joint.parent if j in self.stance else joint.child):
-                turned = cross(self.twists[i].omega, self.mass_velocities[j])
-                hessian[min(i, j), max(i, j)] = turned.z * gravity
+                rises = cross(self.up, self.twists[i].omega)  # up . (omega x v), with up x omega once for i
+                hessian[min(i, j), max(i, j)] = dot(rises, self.mass_velocities[j]) * gravity
         return hessian

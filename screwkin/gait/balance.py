@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from screwkin.dynamics.newton_euler import GRAVITY, Bodies, ground_wrench
-from screwkin.dynamics.support import Spike, spikes, support_margin
+from screwkin.dynamics.support import Spike, sole_corners, spikes
 from screwkin.dynamics.zmp import cart_table_zmp, zmp_from_wrench
 from screwkin.errors import InputError
 from screwkin.kernel.body import balance as compiled_balance
+from screwkin.kernel.margin import support_margin_fast
 from screwkin.kernel.run import FROM, run
 from screwkin.kinematics.mass import center_of_mass
 from screwkin.model.robot import Robot
@@ -47,20 +48,6 @@ class Balance:
     def distance(self) -> Array:
         """|GCoM - ZMP| (T,) [m]."""
         return np.asarray(np.linalg.norm(self.com[:, :2] - self.zmp, axis=1))
-
-
-def sole_corners(robot: Robot, foot: str) -> Array:
-    """Corners (k, 3) of a foot's sole in the frame of its tip [m].
-
-    Raises:
-        InputError: the table gives no sole for that limb.
-    """
-    limb = robot.limb(foot)
-    for sole in robot.soles:
-        if sole.limb == limb.name:
-            back = limb.frame.inverse
-            return np.asarray(as_array([back @ corner for corner in sole.corners]))
-    raise InputError(f"robot {robot.name}: limb {limb.name} has no [[sole]]; add one to check the ZMP")
 
 
 def soles_on_floor(robot: Robot, feet: tuple[str, ...], T_world_tip: Mapping[str, Array]) -> Array:
@@ -120,7 +107,7 @@ def ground_margin(zmp: Array, com: Array, wrench: Array, soles: Array, contact: 
         soles: (T, feet, corners, 2) [m].
         contact: (T, feet).
     """
-    margin = support_margin(zmp, soles, contact)
+    margin = support_margin_fast(zmp, soles, contact)
     return np.where(wrench[:, 5] > 0, margin, np.minimum(margin, 0.0) - np.abs(com[:, 2]))
 
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from screwkin.dynamics.support import sole_corners
 from screwkin.errors import InputError
-from screwkin.gait.balance import sole_corners
 from screwkin.gait.plan import Plan
 from screwkin.gait.stance import LEFT, RIGHT, Foot, Hand, Stance
 from screwkin.kernel.blocks import least_values

@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from screwkin.dynamics.newton_euler import GRAVITY
 from screwkin.errors import InputError, UnknownNameError
-from screwkin.kernel import body, limbs
+from screwkin.kernel import body, deflection, limbs
 from screwkin.kernel.emit_c import Real, header, source
+from screwkin.kernel.margin import margin
 from screwkin.kernel.program import Group, Program
 from screwkin.kernel.records import identifier
 from screwkin.kernel.run import run
@@ -40,6 +42,14 @@ def _rates(accelerations: bool) -> Callable[[Robot], list[Program]]:
     return make
 
 
+def _deflections(robot: Robot) -> list[Program]:
+    """On either leg; a robot without legs is held by its base."""
+    if robot.closures or not (robot.mass > 0 and robot.joints):
+        raise InputError(f"{robot.name} has closures, or no mass or joints; deflections are those of trees")
+    legs = [limb.tip for limb in robot.limbs if limb.kind == "leg"]
+    return [deflection.linear(robot, support) for support in legs or ["base"]]
+
+
 def _weighing(make: Callable[[Robot], Program]) -> Callable[[Robot], list[Program]]:
     def made(robot: Robot) -> list[Program]:
         if not robot.mass > 0:
@@ -56,6 +66,8 @@ KINDS: Mapping[str, Callable[[Robot], list[Program]]] = {
     "motion": _rates(True),
     "zmp": _weighing(body.balance),
     "ik": _closed_limbs,
+    "margin": lambda robot: [margin(robot)],
+    "deflection": _deflections,
 }
 """What can be asked for."""
 
@@ -98,10 +110,14 @@ def example(robot: Robot, program: Program) -> dict[str, Array]:
     home = np.array(posture.q if posture else [0.1] * len(robot.joints), dtype=float)
     q, T = home + rng.uniform(-0.1, 0.1, len(home)), np.eye(4)
     T[2, 3] = posture.base_height if posture else 0.0
-    told: dict[str, Array] = {"T_world_base": T, "q": q}
+    told: dict[str, Array] = {"T_world_base": T, "q": q, "gravity": [GRAVITY], "zmp": T[:2, 3] + 0.01}
+    told["stiffness"] = np.linspace(40.0, 80.0, len(home))
+    told["contact"] = np.ones(len({sole.limb for sole in robot.soles}))
+    D = link_displacements(robot, q.tolist())
     for limb in robot.limbs:
+        pose = as_array(frame_pose(robot, D, limb.tip))
+        told[identifier("T_world", limb.tip)] = T @ pose
         if program.name == identifier(robot.name, limb.name, "nearest"):
-            pose = as_array(frame_pose(robot, link_displacements(robot, q.tolist()), limb.tip))
             told |= {"T_base_tip": pose, "guess": home[list(Chain.of(robot, limb.name).joints)]}
     return {g.name: told[g.name] if g.name in told else rng.uniform(-1, 1, g.shape) for g in program.inputs}
 

@@ -13,8 +13,16 @@ needs_compiler = pytest.mark.skipif(native.compiler() is None, reason="no C comp
 
 
 @needs_compiler
-@pytest.mark.parametrize("kind", ["double", "float"])
-@pytest.mark.parametrize(("robot", "what"), [("bioloid", "ik,rates,tips"), ("poppy12", "ik,motion,com,zmp")])
+@pytest.mark.parametrize(
+    ("robot", "what", "kind"),
+    [
+        ("bioloid", "ik,rates,tips,margin", "double"),
+        ("bioloid", "ik,rates,tips,margin", "float"),
+        ("poppy12", "ik,motion,com,zmp", "double"),
+        ("poppy12", "ik,motion,com,zmp", "float"),
+        ("poppy12", "deflection", "float"),
+    ],
+)
 def test_generated_c_compiles_without_warnings_and_its_driver_passes(cli, tmp_path, robot, what, kind):
     flags = ["--float"] if kind == "float" else []
     done = cli("codegen", robot, "--what", what, *flags, "-o", str(tmp_path), "--json")
@@ -47,6 +55,8 @@ def test_the_driver_notices_a_wrong_sign(cli, tmp_path):
         (("bioloid", "--what", "ik,magic"), "unknown kind of program 'magic'"),
         (("linkages/four-bar", "--what", "ik"), "no limb with a closed form"),
         (("linkages/four-bar", "--what", "rates"), "rates follow limbs"),
+        (("linkages/four-bar", "--what", "margin"), "has no [[sole]]"),
+        (("linkages/four-bar", "--what", "deflection"), "deflections are those of trees"),
         (("bioloid", "--what", ","), "nothing is asked for"),
     ],
 )
