@@ -28,9 +28,11 @@ Array = Any
 
 FLAGS = (
     *("-std=c99", "-O3", "-march=native", "-mprefer-vector-width=512"),
-    *("-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math", "-shared", "-fPIC"),
+    *("-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math"),
+    *("-fno-thread-jumps", "-fno-tree-pre", "-shared", "-fPIC"),
 )
-"""Fused multiply-adds and no errno, but IEEE arithmetic otherwise: NaN and infinity keep their meaning."""
+"""Fused multiply-adds and no errno, but IEEE arithmetic otherwise: NaN and infinity keep their meaning. Choices
+stay choices: made into jumps, they would keep the compiler from computing several samples at once."""
 THREADED_FROM = 8192
 """Samples from which the batch is shared among the processor's cores."""
 
