@@ -38,16 +38,14 @@ def environment(name: str, packages: Sequence[str]) -> Path | None:
     """
     place = ROOT / "environments" / name
     python = place / "bin" / "python"
-    if (place / "done").exists():
-        return python
-    venv.create(place, with_pip=True, clear=True)
-    done = subprocess.run(
-        [str(python), "-m", "pip", "install", "--quiet", *packages], capture_output=True, text=True
-    )
-    if done.returncode:
-        return None
-    # Only now, so that everything the peer needs is really there, in the versions that it asks for.
+    if not (place / "done").exists():
+        venv.create(place, with_pip=True, clear=True)
+        command = [str(python), "-m", "pip", "install", "--quiet", *packages]
+        if subprocess.run(command, capture_output=True).returncode:
+            return None
+        (place / "done").touch()
+    # Only after that, so that everything the peer needs is really there, in the versions that it asks for;
+    # and every time, since the checkout may have another environment now.
     inherited = sysconfig.get_path("purelib", vars={"base": str(place)})
     Path(inherited, "zz-inherited.pth").write_text(sysconfig.get_path("purelib") + "\n")
-    (place / "done").touch()
     return python

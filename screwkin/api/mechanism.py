@@ -181,6 +181,8 @@ def solve_pose(
         told = f"targets[{name!r}]"
         wanted[name] = rigid(told, checked(told, value, 4, 4)) if pose else checked(told, value, 3)
     guess = home(robot) if guess is None else guess
-    parts(robot, guess)
-    start = State(np.asarray(guess.T_world_base, dtype=float), np.asarray(guess.q, dtype=float))
+    base = checked("guess.T_world_base", guess.T_world_base, 4, 4)
+    base = base if "base" in wanted else rigid("guess.T_world_base", base)
+    q = checked("guess.q", guess.q, len(robot.joints))
+    start = State(np.asarray(base, dtype=float), np.asarray(q, dtype=float))
     return (solve_pose_fast if method == "auto" else newton_pose)(robot, wanted, start)

@@ -31,8 +31,8 @@ FLAGS = (
     *("-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math"),
     *("-fno-thread-jumps", "-fno-tree-pre", "-shared", "-fPIC"),
 )
-"""Fused multiply-adds and no errno, but IEEE arithmetic otherwise: NaN and infinity keep their meaning. Choices
-stay choices: made into jumps, they would keep the compiler from computing several samples at once."""
+"""Fused multiply-adds and no errno, but IEEE arithmetic otherwise: NaN and infinity keep their meaning.
+Choices stay choices: made into jumps, they would keep the compiler from computing several samples at once."""
 THREADED_FROM = 8192
 """Samples from which the batch is shared among the processor's cores."""
 
@@ -78,12 +78,18 @@ class Native:
         if cores == 1:
             return partial(self.function, count, *map(_address, arrays))
         bounds = [count * k // cores for k in range(cores + 1)]
-        parts = [
+        own, *others = [
             (stop - start, *(_address(a) + start * a.strides[0] for a in arrays))
             for start, stop in pairwise(bounds)
         ]
-        # ctypes lets go of the interpreter while C computes
-        return lambda: list(_pool().map(lambda part: self.function(*part), parts))
+
+        def together() -> None:  # ctypes lets go of the interpreter while C computes
+            running = [_pool().submit(self.function, *part) for part in others]
+            self.function(*own)
+            for part in running:
+                part.result()
+
+        return together
 
 
 def _address(array: Array) -> int:

@@ -61,3 +61,17 @@ def test_wrong_results_are_not_timed(monkeypatch: pytest.MonkeyPatch) -> None:
     )
     with pytest.raises(AssertionError, match=r"0\.00% of the samples agree"):
         devices.measured(program, given, "float64", jax.devices()[:1], 1)
+
+
+def test_every_kernel_gets_inputs_that_it_can_answer() -> None:
+    robot = sk.load_robot("bioloid")
+    told = {program.name: (program, given) for program, given in devices.inputs(robot, 40)}
+    assert set(told) == {f"bioloid_{name}" for name in ("rates", "zmp", "right_leg_nearest", "pose")}
+    for program, given in told.values():
+        assert {group.name for group in program.inputs} == set(given)
+        for name, x in devices.run(program, given, path="numpy").items():
+            assert len(x) == 40
+            assert np.isfinite(x).all(), name
+    reached = devices.run(*told["bioloid_pose"], path="numpy")
+    assert (reached["sure"].all(axis=1)).mean() > 0.9
+    assert reached["error"][reached["sure"] > 0].max() < 1e-12
