@@ -105,12 +105,14 @@ def _kept(*arrays: Array) -> tuple[Array, ...]:
 
     Other devices wait for the host at every condition; theirs fuse with care and need only a hint.
     """
-    if not arrays:
-        return ()
+    if not arrays or not arrays[0].size:
+        return arrays
 
     def condition(*x: Array) -> tuple[Array, ...]:
         odd = jnp.isnan(x[0].ravel()[0])
-        return tuple(lax.cond(odd, lambda *y: tuple(2.0 * a for a in y), lambda *y: y, *x))
+        # Either branch gives the same arrays, which XLA does not know.
+        same = lambda *y: tuple(jnp.where(jnp.isnan(a), 2.0 * a, a) for a in y)  # noqa: E731
+        return tuple(lax.cond(odd, same, lambda *y: y, *x))
 
     def hint(*x: Array) -> tuple[Array, ...]:
         return tuple(lax.optimization_barrier(x))

@@ -27,12 +27,13 @@ from screwkin.kernel.program import Program
 Array = Any
 
 FLAGS = (
-    *("-std=c99", "-O3", "-march=native", "-mprefer-vector-width=512"),
+    *("-std=c99", "-O3", "-march=native", "-shared", "-fPIC"),
     *("-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math"),
-    *("-fno-thread-jumps", "-fno-tree-pre", "-shared", "-fPIC"),
 )
-"""Fused multiply-adds and no errno, but IEEE arithmetic otherwise: NaN and infinity keep their meaning.
-Choices stay choices: made into jumps, they would keep the compiler from computing several samples at once."""
+"""Fused multiply-adds and no errno, but IEEE arithmetic otherwise: NaN and infinity keep their meaning."""
+TUNED = ("-mprefer-vector-width=512", "-fno-thread-jumps", "-fno-tree-pre")
+"""Tried first, as not every compiler knows them. Choices stay choices: made into jumps, they would keep the
+compiler from computing several samples at once."""
 THREADED_FROM = 8192
 """Samples from which the batch is shared among the processor's cores."""
 
@@ -109,6 +110,10 @@ def _pool() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(_cores(), thread_name_prefix="screwkin")
 
 
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_pool.cache_clear)  # a forked child has none of its threads
+
+
 def is_kept(program: Program) -> bool:
     """True if the compiled program is loaded or lies in the cache: using it costs no compilation."""
     cc = compiler()
@@ -133,7 +138,7 @@ def shared(text: str, name: str, flags: tuple[str, ...] = ()) -> Any:
     library = _library(text, cc, flags)
     try:
         if not library.exists():
-            _build(text, [cc, *FLAGS, *flags], library)
+            _build(text, cc, flags, library)
         return ctypes.CDLL(str(library))[name]
     except (OSError, OutputError, AttributeError, subprocess.SubprocessError):
         return None
@@ -164,13 +169,20 @@ def digest(*told: str) -> str:
 
 def _library(text: str, cc: str, flags: tuple[str, ...]) -> Path:
     made_by = os.stat(cc)
-    name = digest(text, cc, str(made_by.st_size), str(made_by.st_mtime_ns), _machine(), *FLAGS, *flags)
+    name = digest(
+        text, cc, str(made_by.st_size), str(made_by.st_mtime_ns), _machine(), *FLAGS, *TUNED, *flags
+    )
     return cache_folder() / f"{name}.so"
 
 
-def _build(text: str, command: Sequence[str], library: Path) -> None:
+def _build(text: str, cc: str, flags: tuple[str, ...], library: Path) -> None:
     """Compile beside, then rename: two processes may do so at once."""
     library.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
     with atomic_path(library) as beside:
-        told = [*command, "-x", "c", "-o", str(beside), "-", "-lm"]
-        subprocess.run(told, input=text, text=True, check=True, capture_output=True, timeout=300)
+        ends = [*flags, "-x", "c", "-o", str(beside), "-", "-lm"]
+        for tuned in (TUNED, ()):
+            told = [cc, *FLAGS, *tuned, *ends]
+            done = subprocess.run(told, input=text, text=True, capture_output=True, timeout=300)
+            if not done.returncode:
+                return
+        done.check_returncode()

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from screwkin.errors import ShapeError
 from screwkin.kernel import limbs
 from screwkin.kernel.records import identifier
 from screwkin.kernel.run import FROM, run
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
-from screwkin.solve.pose import PoseSolution, solve_pose
+from screwkin.solve.chain import Chain
+from screwkin.solve.pose import PoseSolution, solve_pose, unwound
 from screwkin.solve.status import Status
 
 Array = Any
@@ -37,6 +39,7 @@ def solve_pose_fast(robot: Robot, targets: Mapping[str, Array], guess: State) ->
     inputs = {"T_world_base": base, "guess": guess.q}
     inputs |= {identifier(name): targets[name] for name, _ in told}
     found = run(limbs.whole_body(robot, told), inputs)
+    _unwind(robot, [name for name, _ in told], found, guess.q)
     error, batch = found["error"], found["q"].shape[:-1]
     solution = PoseSolution(
         State(np.broadcast_to(base, (*batch, 4, 4)), found["q"]),
@@ -56,15 +59,37 @@ def solve_pose_fast(robot: Robot, targets: Mapping[str, Array], guess: State) ->
     return solution.replaced(again, solve_pose(robot, picked, rest))
 
 
+def _unwind(robot: Robot, tips: Sequence[str], found: dict[str, Array], guess: Array) -> None:
+    """Take positions more than half a turn from the guess to the turn nearest to it, where limits allow."""
+    q = found["q"].reshape(-1, len(robot.joints))
+    near = np.broadcast_to(guess, found["q"].shape).reshape(q.shape)
+    rows = np.flatnonzero((np.abs(q - near) > np.pi).any(axis=1))
+    if not len(rows):
+        return
+    q[rows] = unwound(robot.joints, q[rows], near[rows])
+    for k, chain in enumerate(Chain.of(robot, tip) for tip in tips):
+        own = q[rows][:, list(chain.joints)]
+        excess = np.maximum(chain.lower - own, own - chain.upper)
+        found["beyond"].reshape(-1, len(tips))[rows, k] = excess.max(axis=1)
+        found["worst"].reshape(-1, len(tips))[rows, k] = np.array(chain.joints)[excess.argmax(axis=1)]
+
+
 def _inner(target: Array) -> int:
     return 2 if np.shape(target)[-2:] == (4, 4) else 1
 
 
 def _count(targets: Mapping[str, Array], guess: State) -> int:
-    """Size of the largest batch among the arguments."""
+    """Samples of the batch.
+
+    Raises:
+        ShapeError: batches do not fit.
+    """
     shapes = [np.shape(guess.T_world_base)[:-2], np.shape(guess.q)[:-1]]
     shapes += [np.shape(x)[: np.ndim(x) - _inner(x)] for x in targets.values()]
-    return max(int(np.prod(shape)) for shape in shapes)
+    try:
+        return int(np.prod(np.broadcast_shapes(*shapes)))
+    except ValueError:
+        raise ShapeError(f"batches of base, targets and guess do not broadcast: {shapes}") from None
 
 
 def _picked(array: Array, batch: tuple[int, ...], rows: Array, inner: int) -> Array:

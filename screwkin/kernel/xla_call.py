@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -100,7 +101,8 @@ def _target(program: Program) -> str | None:
 
 def source(program: Program) -> str:
     """C of a program for XLA: its functions, and the handler of ``xla_handler.c`` around them."""
-    header = emit_c.header([program], "SCREWKIN_KERNEL_H", "double")
+    made_for = f"/* jaxlib {version('jaxlib')} */\n"  # its headers belong to what is kept
+    header = made_for + emit_c.header([program], "SCREWKIN_KERNEL_H", "double")
     return "\n".join([header + emit_c.source([program], None), _definitions(program), _HANDLER])
 
 

@@ -235,7 +235,7 @@ def _solve_block(
         return r * weights, J * weights[:, None]
 
     result = newton(residual, q[:, joints])
-    q[:, joints] = _unwound([robot.joints[i] for i in joints], result.x, q[:, joints])
+    q[:, joints] = unwound([robot.joints[i] for i in joints], result.x, q[:, joints])
     r, J = residual(q[:, joints], np.arange(len(q)))
     sigma = np.linalg.svd(J, compute_uv=False)[:, -1] if offsets[-1] else np.ones(len(q))
     for k, row in enumerate(rows):
@@ -251,7 +251,7 @@ def _solve_block(
         )
 
 
-def _unwound(joints: Sequence[Joint], x: Array, guess: Array) -> Array:
+def unwound(joints: Sequence[Joint], x: Array, guess: Array) -> Array:
     """Whole turns of revolute joints taken back: nearest to the guess, or else within the limits."""
     lower, upper = np.array([j.lower for j in joints]), np.array([j.upper for j in joints])
     near = x - 2 * np.pi * np.round((x - guess) / (2 * np.pi))

@@ -54,6 +54,17 @@ def test_gradients_are_those_of_finite_differences():
         np.testing.assert_allclose(slope[joint], difference, atol=1e-9)
 
 
+def test_a_sample_without_numbers_leaves_the_others_as_they_are_and_none_is_no_fault():
+    program = body.mass_center(sk.load_robot("poppy12"))
+    kernel = jax.jit(emit_jax.function(program))
+    T, q = jnp.tile(jnp.eye(4)[..., None], 3), jnp.asarray(np.random.default_rng(1).uniform(-1, 1, (12, 3)))
+    (sound,) = kernel(T, q)
+    (found,) = kernel(T, q.at[:, 0].set(jnp.nan))
+    assert np.isnan(found[:, 0]).any()
+    np.testing.assert_allclose(found[:, 1:], sound[:, 1:], atol=0)
+    assert emit_jax.function(program)(T[..., :0], q[:, :0])[0].shape == (3, 0)
+
+
 def test_a_closed_form_is_differentiable_through_its_branch():
     robot = sk.load_robot("bioloid")
     kernel = emit_jax.function(limbs.limb_nearest(robot, "left_leg"))

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import screwkin as sk
+from screwkin.errors import ShapeError
 from screwkin.kernel import limbs
 from screwkin.kernel.run import run
 from screwkin.solve.chain import Chain
@@ -125,6 +128,23 @@ def test_whole_bodies_are_posed_by_closed_forms_as_by_newton(name, gait):
     np.testing.assert_allclose(fast.state.q, slow.state.q, atol=1e-9)
     assert fast.residual.max() < 1e-12
     assert fast.iterations.max() == 1, "no sample was left to Newton"
+
+
+def test_joints_stay_on_the_turn_of_their_guess():
+    robot = sk.load_robot("bioloid")
+    wide = tuple(replace(joint, lower=-7.0, upper=7.0) for joint in robot.joints)
+    robot = replace(robot, joints=wide)
+    q = np.tile(sk.home(robot).q, (1000, 1))
+    joint = robot.joint_names.index("right_hip_yaw")
+    q[::2, joint] = 3.3
+    q[1::4, joint] = -4.0
+    states = sk.State(np.tile(np.eye(4), (1000, 1, 1)), q)
+    targets = {tip: sk.frame_pose(robot, states, tip) for tip in ("left_foot", "right_foot")}
+    found = sk.solve_pose(robot, targets, states)
+    assert found.ok
+    np.testing.assert_allclose(found.state.q, q, atol=1e-8)
+    with pytest.raises(ShapeError, match="do not broadcast"):
+        sk.solve_pose(robot, targets, sk.State(states.T_world_base[:999], q[:999]))
 
 
 def test_unreachable_singular_and_forbidden_samples_have_the_same_status_in_a_large_batch():
