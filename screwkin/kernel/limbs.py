@@ -55,7 +55,7 @@ def limb_branches(robot: Robot, limb: str) -> Program:
         solves = error <= EXACT
         sure = where(((slack > DOUBT) & solves) | ((slack < -DOUBT) & ~solves), sure, 0.0)
         kind = where(solves, where(excess(chain, q)[0] <= WITHIN, 2.0, 1.0), 0.0)
-        apart = sum(1.0 - cosine for cosine in _cosines(q, near))
+        apart = sum(1.0 - cosine for cosine in cosines(q, near))
         none = kind < 0.5
         shown = [where(none, math.nan, x) for x in q]
         rows.append([apart - FARTHER * kind, kind, where(none, math.inf, error), *shown])
@@ -79,7 +79,7 @@ def _sorted(rows: Sequence[list[Scalar]]) -> list[list[Scalar]]:
     return rows
 
 
-def _cosines(q: Sequence[Scalar], near: Sequence[tuple[Scalar, Scalar]]) -> list[Scalar]:
+def cosines(q: Sequence[Scalar], near: Sequence[tuple[Scalar, Scalar]]) -> list[Scalar]:
     """Cosines of the angles' differences from others that are told by sine and cosine."""
     return [scalar.sin(x) * s + scalar.cos(x) * c for x, (s, c) in zip(q, near, strict=True)]
 
@@ -180,7 +180,7 @@ def nearest_branch(
     rival: Scalar = -50.0
     for *q, slack in branches:
         pairs = [(scalar.sin(x), scalar.cos(x)) for x in q]
-        alike = sum(_cosines(q, near))
+        alike = sum(cosines(q, near))
         here = [where(slack > DOUBT, alike, -100.0), *(x for pair in pairs for x in pair)]
         rival = where((abs_(slack) <= DOUBT) & (alike > rival), alike, rival)
         better = here[0] > best[0]

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 from screwkin import scalar
-from screwkin.kernel.limbs import wrapped
+from screwkin.kernel.limbs import cosines, wrapped
 from screwkin.kernel.program import Program, Recorder
 from screwkin.kernel.records import identifier
 from screwkin.model.robot import Robot
@@ -24,6 +24,7 @@ from screwkin.solve.closed import closed_form
 from screwkin.solve.conditioning import TRUSTED, Extremes, extreme_singular_values
 from screwkin.solve.limb_motion import seen_from
 from screwkin.solve.quartic import abs_
+from screwkin.solve.subproblems import larger
 
 CLEAR = 1e-7
 """Slack of a branch from which its sign alone tells whether it is a solution."""
@@ -106,7 +107,7 @@ def _judged(chain: Chain, branch: Sequence[Scalar], near: Sequence[tuple[Scalar,
         worse = here > beyond
         beyond = where(worse, here, beyond)
         limit = where(worse, where(upper, LIMITS + 2 * joint + 1, LIMITS + 2 * joint), limit)
-    alike = sum(scalar.sin(x) * s + scalar.cos(x) * c for x, (s, c) in zip(q, near, strict=True))
+    alike = sum(cosines(q, near))
     valid, inside = slack > 0, beyond <= 0
     key = where(valid, where(inside, 2 * INSIDE + alike, -beyond), 2 * OUTSIDE)
     cause = where(valid, where(inside, 0.0, limit), 1.0)
@@ -129,7 +130,7 @@ def _chosen(branches: Sequence[_Branch]) -> tuple[_Branch, Scalar]:
     best, clear, second = branches[0], branches[0].clear, 4.0 * OUTSIDE
     for branch in branches[1:]:
         better = branch.key > best.key
-        second = where(better, best.key, _larger(branch.key, second))
+        second = where(better, best.key, larger(branch.key, second))
         q = [where(better, new, old) for new, old in zip(branch.q, best.q, strict=True)]
         key, cause = where(better, branch.key, best.key), where(better, branch.cause, best.cause)
         best, clear = _Branch(q, key, cause, clear), clear & branch.clear
@@ -146,8 +147,8 @@ def _decided(chain: Chain, best: _Branch) -> Scalar:
     second: Scalar = -FAR
     for joint, x in enumerate(best.q):
         here, _ = _beyond(chain, joint, x)
-        second = _larger(second, where(here > first, first, here))
-        first = _larger(first, here)
+        second = larger(second, where(here > first, first, here))
+        first = larger(first, here)
     return (second < first - NEAR) | (best.cause < LIMITS)
 
 
@@ -179,7 +180,3 @@ def _best_link(chain: Chain, length: float) -> int:
         return recorder.program().operations
 
     return min(range(len(chain.screws) + 1), key=cost)
-
-
-def _larger(a: Scalar, b: Scalar) -> Scalar:
-    return where(a > b, a, b)

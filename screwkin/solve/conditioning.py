@@ -18,8 +18,9 @@ import numpy as np
 
 from screwkin.mechanism.graph import components
 from screwkin.scalar import Scalar, minus, plus, sqrt, times, where
+from screwkin.solve.limb_rates import product
 from screwkin.solve.quartic import abs_
-from screwkin.solve.subproblems import least, root
+from screwkin.solve.subproblems import larger, least, root
 
 STEPS = 4
 """Steps of Laguerre's iteration after the one from infinity or zero; each triples the number of digits."""
@@ -76,7 +77,7 @@ def least_singular_value(columns: Sequence[Sequence[Scalar]]) -> tuple[Scalar, S
 
 
 def _joined(a: Extremes, b: Extremes) -> Extremes:
-    return Extremes(least(a.least, b.least), _larger(a.largest, b.largest), plus(a.error, b.error))
+    return Extremes(least(a.least, b.least), larger(a.largest, b.largest), plus(a.error, b.error))
 
 
 def _blocks(columns: Sequence[Sequence[Scalar]]) -> list[list[list[Scalar]]]:
@@ -106,11 +107,11 @@ def two_diagonals(columns: Sequence[Sequence[Scalar]]) -> tuple[list[Scalar], li
     if len(left) == 1:
         return [times(left[0][0], left[0][0])], []
     a, b = left  # of the last two columns the squares need no reflection
-    size, along, area = _dot(a, a), _dot(a, b), minus(times(a[0], b[1]), times(a[1], b[0]))
+    size, along, area = product(a, a), product(a, b), minus(times(a[0], b[1]), times(a[1], b[0]))
     some = size > 0
     inverse = 1 / where(some, size, 1.0)
     last = times(times(area, area), inverse)
-    beside = where(some, times(times(along, along), inverse), _dot(b, b))
+    beside = where(some, times(times(along, along), inverse), product(b, b))
     return [*diagonal, size, last], [*above, beside]
 
 
@@ -122,7 +123,7 @@ def _reflected(
     Source: Householder (1958); the sign is the one that does not cancel.
     """
     support = _support(x) or [0]
-    pivot, square = support[0], _dot(x, x)
+    pivot, square = support[0], product(x, x)
     moved = [list(other) for other in others]
     if len(support) > 1:
         size = sqrt(square)
@@ -132,7 +133,7 @@ def _reflected(
         half = plus(square, times(size, where(x[pivot] < 0, -x[pivot], x[pivot])))
         scale = 1 / where(some, half, 1.0)
         for other in moved:
-            share = times(scale, _dot(list(normal.values()), [other[i] for i in support]))
+            share = times(scale, product(list(normal.values()), [other[i] for i in support]))
             for i, component in normal.items():
                 other[i] = minus(other[i], times(share, component))
     at = [other.pop(pivot) for other in moved]
@@ -205,20 +206,9 @@ def _inverse(x: Scalar) -> Scalar:
     return 1 / x if not isinstance(x, int | float) or x else math.nan
 
 
-def _larger(a: Scalar, b: Scalar) -> Scalar:
-    return where(a > b, a, b)
-
-
 def _support(x: Sequence[Scalar]) -> list[int]:
     """Where a vector is not an exact 0."""
     return [i for i, a in enumerate(x) if not (isinstance(a, int | float) and a == 0)]
-
-
-def _dot(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
-    total: Scalar = 0
-    for x, y in zip(a, b, strict=True):
-        total = plus(total, times(x, y))
-    return total
 
 
 def _transposed(vectors: Sequence[Sequence[Scalar]]) -> list[list[Scalar]]:

@@ -119,12 +119,12 @@ def orthogonal(columns: Sequence[Sequence[Scalar]], wanted: Sequence[Scalar]) ->
     shares: list[list[Scalar]] = []
     right: list[Scalar] = []
     for k, column in enumerate(columns):
-        size = scalar.sqrt(_product(column, column))
+        size = scalar.sqrt(product(column, column))
         unit = [x / size for x in column]
-        shares.append([_product(unit, other) for other in columns[k + 1 :]])
+        shares.append([product(unit, other) for other in columns[k + 1 :]])
         for j, share in enumerate(shares[-1]):
             columns[k + 1 + j] = _less(columns[k + 1 + j], unit, share)
-        along = _product(unit, rest)
+        along = product(unit, rest)
         rest = _less(rest, unit, along)
         shares[-1].insert(0, size)
         right.append(along)
@@ -132,12 +132,13 @@ def orthogonal(columns: Sequence[Sequence[Scalar]], wanted: Sequence[Scalar]) ->
     found: list[Scalar] = []
     for k in reversed(range(len(columns))):
         size, *others = shares[k]
-        known = _product(others, found)
+        known = product(others, found)
         found.insert(0, minus(right[k], known) / size)
     return found, volume
 
 
-def _product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
+def product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:
+    """Scalar product of two vectors of any size."""
     total: Scalar = 0
     for x, y in zip(a, b, strict=True):
         total = plus(total, times(x, y))

@@ -51,6 +51,11 @@ def level_turns(s: Vector, a: Vector, m: Vector, level: Scalar) -> tuple[Scalar,
     )
 
 
+def larger(a: Scalar, b: Scalar) -> Scalar:
+    """The larger of two."""
+    return where(a > b, a, b)
+
+
 def least(a: Scalar, b: Scalar) -> Scalar:
     """The smaller of two scalars."""
     return where(a < b, a, b)
