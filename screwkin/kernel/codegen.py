@@ -10,7 +10,7 @@ import numpy as np
 from screwkin.dynamics.newton_euler import GRAVITY
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.kernel import body, deflection, limbs
-from screwkin.kernel.emit_c import Real, header, source
+from screwkin.kernel.emit_c import Real, argument, header, source
 from screwkin.kernel.margin import margin
 from screwkin.kernel.program import Group, Program
 from screwkin.kernel.records import identifier
@@ -97,7 +97,7 @@ def c_files(robot: Robot, programs: Sequence[Program], real: Real = "double") ->
     name = identifier(robot.name)
     return {
         f"{name}.h": header(programs, f"{name.upper()}_H", real),
-        f"{name}.c": source(programs, f"{name}.h"),
+        f"{name}.c": source(programs, f"{name}.h", real),
         f"test_{name}.c": _driver(robot, programs, name, TOLERANCE[real]),
         "README.md": _readme(robot, programs, name, real),
     }
@@ -170,18 +170,19 @@ int main(void)
 
 def _trial(program: Program) -> str:
     def buffer(group: Group) -> str:
-        return f"    static screwkin_real {group.name}[{group.size} * SAMPLES];"
+        return f"    static screwkin_real {argument(group)}[{group.size} * SAMPLES];"
 
     loads = "\n".join(
         f"        for (size_t k = 0; k < {g.size}; ++k)\n"
-        f"            {g.name}[i * {g.size} + k] = {program.name}_{g.name}[k];"
+        f"            {argument(g)}[i * {g.size} + k] = {program.name}_{g.name}[k];"
         for g in program.inputs
     )
+    name = program.name
     checks = " + ".join(
-        f'differs("{program.name}: {g.name}", {g.name}, {program.name}_{g.name}_wanted, {g.size}, samples)'
+        f'differs("{name}: {g.name}", {argument(g)}, {name}_{g.name}_wanted, {g.size}, samples)'
         for g in program.outputs
     )
-    arguments = ", ".join(["samples", *(g.name for g in (*program.inputs, *program.outputs))])
+    arguments = ", ".join(["samples", *(argument(g) for g in (*program.inputs, *program.outputs))])
     buffers = "\n".join(buffer(g) for g in (*program.inputs, *program.outputs))
     return f"""
 static int try_{program.name}(size_t samples)
@@ -201,13 +202,15 @@ def _readme(robot: Robot, programs: Sequence[Program], name: str, real: Real) ->
     return f"""# {robot.name} in C
 
 Made by screwkin from the screw table of `{robot.name}`; numbers are of type `{real}`, units SI, angles in
-rad. No allocation; the square root and `floor` of the C library are all that is needed. `{name}.h` tells the
+rad. No allocation; the square root of the C library is all that is needed. `{name}.h` tells the
 arguments: arrays hold sample after sample, row by row.
 
 {rows}
 
-For vectors over the samples and fused multiply-adds: `-O3 -march=native -ffp-contract=fast -fno-math-errno
--fno-trapping-math`. The driver compares with numbers from Python and exits with 1 if one differs:
+For wide vectors over the samples and fused multiply-adds: `-O2 -march=native -ffp-contract=fast
+-fno-math-errno -fno-trapping-math`; GCC gains another fifth by `-fschedule-insns -fsched-pressure`.
+`-DSCREWKIN_SCALAR` computes one sample at a time. The driver compares with numbers from Python and exits with
+1 if one differs:
 
 ```sh
 cc -std=c99 -O2 -o test_{name} test_{name}.c {name}.c -lm && ./test_{name}

@@ -27,13 +27,12 @@ from screwkin.kernel.program import Program
 Array = Any
 
 FLAGS = (
-    *("-std=c99", "-O3", "-march=native", "-shared", "-fPIC"),
+    *("-std=c99", "-O2", "-march=native", "-shared", "-fPIC"),
     *("-ffp-contract=fast", "-fno-math-errno", "-fno-trapping-math"),
 )
 """Fused multiply-adds and no errno, but IEEE arithmetic otherwise: NaN and infinity keep their meaning."""
-TUNED = ("-mprefer-vector-width=512", "-fno-thread-jumps", "-fno-tree-pre")
-"""Tried first, as not every compiler knows them. Choices stay choices: made into jumps, they would keep the
-compiler from computing several samples at once."""
+TUNED = ("-fschedule-insns", "-fsched-pressure")
+"""Tried first, as not every compiler knows them: operations that wait for nothing move in front of others."""
 THREADED_FROM = 8192
 """Samples from which the batch is shared among the processor's cores."""
 

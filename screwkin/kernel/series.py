@@ -16,18 +16,18 @@ def _interpolated(series: Sequence[float], top: float, count: int) -> list[float
     return [float(c) for c in fitted.convert(kind=np.polynomial.Polynomial, domain=[-1, 1]).coef]
 
 
-_EIGHTH = (math.pi / 4) ** 2
+_QUARTER = (math.pi / 2) ** 2
 
-SINE = _interpolated([(-1) ** k / math.factorial(2 * k + 1) for k in range(1, 12)], _EIGHTH, 6)
-"""sin(r) = r + r u (S0 + S1 u + ...), u = r^2, for |r| <= pi/4."""
-COSINE = _interpolated([(-1) ** k / math.factorial(2 * k) for k in range(2, 12)], _EIGHTH, 6)
-"""cos(r) = 1 - u/2 + u^2 (C0 + C1 u + ...), u = r^2, for |r| <= pi/4."""
+SINE = _interpolated([(-1) ** k / math.factorial(2 * k + 1) for k in range(1, 16)], _QUARTER, 8)
+"""sin(r) = r + r u (S0 + S1 u + ...), u = r^2, for |r| <= pi/2."""
+COSINE = _interpolated([(-1) ** k / math.factorial(2 * k) for k in range(2, 16)], _QUARTER, 7)
+"""cos(r) = 1 - u/2 + u^2 (C0 + C1 u + ...), u = r^2, for |r| <= pi/2."""
 ARC = _interpolated([(-1) ** (k + 1) / (2 * k + 3) for k in range(40)], math.tan(math.pi / 8) ** 2, 12)
 """atan(t) = t + t u (A0 + A1 u + ...), u = t^2, for |t| <= tan(pi/8)."""
 
-QUARTER_TURN = tuple(map(float.fromhex, ("0x1.921fb544p+0", "0x1.0b4611a6p-34", "0x1.3198a2e037073p-69")))
-"""pi/2 in three parts, the first two with 33 bits and trailing zeros: k times each is exact for |k| < 2^20
-(Cody and Waite 1980), so that the remainder of an angle keeps its digits for many turns."""
+HALF_TURN = (float.fromhex("0x1.921fb544p+1"), float.fromhex("0x1.0b4611a626331p-33"))
+"""pi in two parts, the first with 33 bits and trailing zeros: k times it is exact for |k| < 2^20 (Cody and
+Waite 1980), so that the remainder of an angle keeps its digits for many turns."""
 
 TURNS = 1e5
 """Largest angle [rad] for which sine and cosine keep their digits."""
