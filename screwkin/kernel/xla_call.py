@@ -90,8 +90,8 @@ def _target(program: Program) -> str | None:
     """The program's handler, compiled and told to XLA under a name that its text decides; None without."""
     if not all(group.size for group in (*program.inputs, *program.outputs)):
         return None
-    include = jax.ffi.include_dir()
-    handler = native.shared(source(program), f"{program.name}_xla", (f"-I{include}",))
+    flags = (f"-I{jax.ffi.include_dir()}", "-D_DEFAULT_SOURCE")
+    handler = native.shared(source(program), f"{program.name}_xla", flags)
     if handler is None:
         return None
     name = f"screwkin.{program.name}.{native.digest(source(program))[:16]}"

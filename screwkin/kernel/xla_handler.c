@@ -5,7 +5,11 @@
    PROGRAM(samples, in, out)    the program's function, its arrays shifted
    HANDLER                      the handler's name */
 
+#include <stdint.h>
 #include <stdlib.h>
+#ifdef __linux__
+#include <sys/mman.h>
+#endif
 #include "xla/ffi/api/c_api.h"
 
 #define SHARE 2048 /* samples worth a thread of their own */
@@ -59,6 +63,19 @@ static int succeeded(const XLA_FFI_Api *api, XLA_FFI_Error *error)
     return !error;
 }
 
+/* XLA's results are fresh memory, which the system maps page by page as it is written. */
+static void in_large_pages(real *at, size_t count)
+{
+#ifdef MADV_HUGEPAGE
+    const uintptr_t page = (uintptr_t)1 << 21;
+    const uintptr_t begin = ((uintptr_t)at + page - 1) / page * page, end = (uintptr_t)(at + count) / page * page;
+    if (begin < end)
+        (void)madvise((void *)begin, end - begin, MADV_HUGEPAGE); /* if it is refused, pages stay small */
+#else
+    (void)at, (void)count;
+#endif
+}
+
 static size_t threads(const XLA_FFI_CallFrame *call)
 {
     int64_t count = 1;
@@ -87,6 +104,8 @@ XLA_FFI_Error *HANDLER(XLA_FFI_CallFrame *call)
     for (int64_t d = 0; d < first->rank; ++d)
         samples *= (size_t)first->dims[d];
     samples /= sizes[0];
+    for (size_t k = 0; k < OUTPUTS; ++k)
+        in_large_pages(one.out[k], samples * sizes[k]);
     const size_t worth = samples / SHARE, pool = worth > 1 ? threads(call) : 1;
     const size_t parts = worth < pool ? worth : pool;
     XLA_FFI_Future_Create_Args made = {XLA_FFI_Future_Create_Args_STRUCT_SIZE, NULL, NULL};
