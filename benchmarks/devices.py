@@ -66,7 +66,7 @@ def inputs(robot: Robot, count: int) -> Iterator[tuple[Program, dict[str, Array]
     """The kernels of rates, balance, a leg and the whole body's positions, with inputs (count, *shape)."""
     rng, given = np.random.default_rng(2), workloads.motion(robot, count)
     state = {"T_world_base": given.T_world_base, "q": given.q}
-    rates = {"base_twist": given.waist, **{identifier(tip): x for tip, x in given.tips.items()}}
+    rates = {"base_twist": given.waist, **{identifier("twist", tip): x for tip, x in given.tips.items()}}
     yield body.motion(robot), state | rates
     second = {"qd": rng.uniform(-1, 1, given.q.shape), "qdd": rng.uniform(-1, 1, given.q.shape)}
     second |= {"base_twist": given.waist, "base_acceleration": rng.uniform(-1, 1, (count, 6))}
@@ -77,7 +77,7 @@ def inputs(robot: Robot, count: int) -> Iterator[tuple[Program, dict[str, Array]
     targets = {limb.tip: sk.frame_pose(robot, sk.State(**state), limb.tip) for limb in robot.limbs}
     targets |= {limb.tip: targets[limb.tip][:, :3, 3] for limb in robot.limbs if limb.kind != "leg"}
     if told := closed_targets(robot, targets):
-        wanted = {identifier(tip): x for tip, x in targets.items()}
+        wanted = {identifier("target", tip): x for tip, x in targets.items()}
         home = np.broadcast_to(sk.home(robot).q, given.q.shape)
         yield limbs.whole_body(robot, told), {"T_world_base": given.T_world_base, "guess": home, **wanted}
 

@@ -45,7 +45,7 @@ def _rate_kernels(robot: Robot, given: Motion) -> Contestants:
     """The same by the compiled program, on every path that this computer has."""
     program = body.motion(robot)
     told = {"T_world_base": given.T_world_base, "q": given.q, "base_twist": given.waist}
-    told |= {identifier(tip): values for tip, values in given.tips.items()}
+    told |= {identifier("twist", tip): values for tip, values in given.tips.items()}
     count = len(given.q)
     flat = [np.ascontiguousarray(told[g.name].reshape(count, g.size)) for g in program.inputs]
     filled = [np.empty((count, g.size)) for g in program.outputs]

@@ -1,6 +1,6 @@
 """python -m benchmarks.roofline [-o DIR]: compiled kernels beside what one core can do.
 
-Two bounds are measured by C loops compiled as the kernels are: multiply-adds that wait for nothing, and
+Two bounds are measured by loops in C: multiply-adds that wait for nothing, and
 copying as many bytes as a batch has. A kernel can be no faster than its operations over the one, nor than its
 bytes over the other.
 """
@@ -24,9 +24,11 @@ from benchmarks.machine import description, pin_threads
 
 COUNT = 4096
 """Samples of a batch."""
-SINE = 32
-"""Operations of a sine with its cosine: reduction, two polynomials and the choice of quarter (``emit_c``)."""
+SINE = 26
+"""Operations of a sine with its cosine: reduction, two polynomials and the signs (``emit_c``)."""
 LANES, STEPS = 32, 200_000
+VECTORS = ("-O3", "-mprefer-vector-width=512")
+"""For the loops below, which a compiler must make vectors of."""
 
 LOOPS = f"""
 #include <stddef.h>
@@ -88,7 +90,7 @@ def peak() -> float:
     """Operations per second of one core: multiply-adds count two."""
     from screwkin.kernel.native import shared
 
-    loop = shared(LOOPS, "multiply_add")
+    loop = shared(LOOPS, "multiply_add", VECTORS)
     x = np.ones(LANES)
     loop.argtypes = [ctypes.c_size_t, ctypes.c_void_p]
     return 2 * LANES * STEPS / fastest(lambda: loop(STEPS, x.ctypes.data))
@@ -98,7 +100,7 @@ def bandwidth(count: int) -> float:
     """Bytes per second, read and written, of copying as many doubles."""
     from screwkin.kernel.native import shared
 
-    loop = shared(LOOPS, "copy")
+    loop = shared(LOOPS, "copy", VECTORS)
     a, b = np.ones(count), np.ones(count)
     loop.argtypes = [ctypes.c_size_t, ctypes.c_void_p, ctypes.c_void_p]
     return 16 * count / fastest(lambda: loop(count, a.ctypes.data, b.ctypes.data))

@@ -14,6 +14,7 @@ from screwkin.kernel.run import run
 from screwkin.kinematics import mass, positions
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
+from screwkin.scalar import is_jax
 from screwkin.screw import at, wrench_at
 from screwkin.se3 import NO_TWIST, ZERO, Pose, Twist, X, Y, Z, as_array, vector_from_array
 
@@ -147,6 +148,12 @@ def momentum(robot: Robot, state: State, qd: Any, base_twist: Any = None) -> Arr
     """
     _check_mass(robot)
     bodies, batch = _bodies(robot, state)
+    if compiles(state, batch) and not (is_jax(qd) or is_jax(base_twist)):
+        moving = {
+            "qd": checked("qd", qd, len(robot.joints)),
+            "base_twist": np.zeros(6) if base_twist is None else checked("base_twist", base_twist, 6),
+        }
+        return run(body.centroidal_momentum(robot), vars(state) | moving)["momentum"]
     h = newton_euler.momentum(bodies, joint_scalars(robot, "qd", qd), twist_of("base_twist", base_twist))
     c = mass.center_of_mass(robot, bodies.poses)
     h = wrench_at(c, h)

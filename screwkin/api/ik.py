@@ -74,7 +74,7 @@ def limb_ik(
     count = int(np.prod(batch))
     shape = target.shape[target.ndim - around :]
     flat = np.broadcast_to(target, (*batch, *shape)).reshape(count, *shape)
-    flat_start = np.broadcast_to(start, (*batch, start.shape[-1])).reshape(count, -1)
+    flat_start = np.broadcast_to(start, (*batch, start.shape[-1])).reshape(count, start.shape[-1])
     if count >= FROM and poses and (method == "closed" or (method == "auto" and solvable(robot, limb, True))):
         return limb_solutions(robot, chain.limb, flat, flat_start, batch, least_squares)
     return solve_limb(chain, flat, method, flat_start, settings or IkSettings(), batch, least_squares)

@@ -167,11 +167,11 @@ def _compiled_motion(robot: Robot, made: Plan, q: Array) -> tuple[Array, Array]:
     """The same rates and accelerations by the compiled reciprocal screws of each limb."""
     count, inputs = (len(made.time),), {"T_world_base": made.T_world_base, "q": q}
     inputs |= {"base_twist": made.base_twist, "base_acceleration": made.base_acceleration}
-    for order, suffix in ((0, ""), (1, "_acceleration")):
+    for order, what in enumerate(("twist", "acceleration")):
         imposed = _imposed(made, order)
         for limb in robot.limbs:
             told = as_array(imposed[limb.tip], count)
             whole = len(robot.path_to(limb.link)) == 6
-            inputs[identifier(limb.tip + suffix)] = told if whole else told[:, 3:]
+            inputs[identifier(what, limb.tip)] = told if whole else told[:, 3:]
     found = run(motion(robot, accelerations=True), inputs)
     return found["qd"], found["qdd"]

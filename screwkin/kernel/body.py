@@ -107,7 +107,7 @@ def motion(robot: Robot, accelerations: bool = False) -> Program:
         return Twist(Vector(*x[:3]) if size == 6 else ZERO, Vector(*x[-3:]))
 
     base = told("base_twist", 6)
-    tips = [told(identifier(limb.tip), size) for limb, size in zip(robot.limbs, sizes, strict=True)]
+    tips = [told(identifier("twist", limb.tip), size) for limb, size in zip(robot.limbs, sizes, strict=True)]
     D = positions.link_displacements(robot, q, Displacement(T.R, ZERO, ZERO))
     limbs = [LimbMotion.of(robot, limb, D, q, best_link(robot, limb.name)) for limb in robot.limbs]
     qd: dict[int, Scalar] = {}
@@ -118,7 +118,7 @@ def motion(robot: Robot, accelerations: bool = False) -> Program:
     if accelerations:
         base_rate = told("base_acceleration", 6)
         for limb, tip, size, name in zip(limbs, tips, sizes, robot.tip_names, strict=True):
-            second = told(identifier(name, "acceleration"), size)
+            second = told(identifier("acceleration", name), size)
             found = limb.accelerations(base, tip, base_rate, second, [qd[i] for i in limb.path])
             qdd.update(zip(limb.path, found, strict=True))
     poses = [Pose(limb.tip.R, T.p + limb.tip.p) for limb in limbs]
@@ -150,6 +150,22 @@ def best_link(robot: Robot, limb: str) -> int:
 
     joints = len(robot.path_to(robot.limb(limb).link))
     return min(range(joints // 3, joints // 2 + 2), key=cost)
+
+
+@cache
+def centroidal_momentum(robot: Robot) -> Program:
+    """Momentum [angular about the CoM; linear], world axes."""
+    recorder = Recorder(
+        identifier(robot.name, "momentum"),
+        f"Momentum of {robot.name} [angular about the centre of mass; linear], world axes.",
+    )
+    n = len(robot.joints)
+    T, q, qd = pose_input(recorder, "T_world_base"), recorder.input("q", n), recorder.input("qd", n)
+    bodies = Bodies.of(robot, T.R, q)
+    h = momentum(bodies, qd, twist_input(recorder, "base_twist"))
+    h = wrench_at(center_of_mass(robot, bodies.poses), h)
+    recorder.output("momentum", [*h.m, *h.f])
+    return recorder.program()
 
 
 @cache

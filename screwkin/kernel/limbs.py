@@ -145,7 +145,7 @@ def whole_body(robot: Robot, targets: tuple[tuple[str, bool], ...]) -> Program:
     told: dict[str, list[Scalar]] = {"error": [], "beyond": [], "worst": [], "sure": []}
     for tip, pose in targets:
         chain = Chain.of(robot, tip)
-        name = identifier(tip)
+        name = identifier("target", tip)
         if pose:
             target = back @ pose_input(recorder, name)
             branches = closed_form(chain).formula(target)

@@ -37,7 +37,7 @@ def solve_pose_fast(robot: Robot, targets: Mapping[str, Array], guess: State) ->
         return solve_pose(robot, targets, guess)
     base = np.asarray(targets.get("base", guess.T_world_base), dtype=float)
     inputs = {"T_world_base": base, "guess": guess.q}
-    inputs |= {identifier(name): targets[name] for name, _ in told}
+    inputs |= {identifier("target", name): targets[name] for name, _ in told}
     found = run(limbs.whole_body(robot, told), inputs)
     _unwind(robot, [name for name, _ in told], found, guess.q)
     error, batch = found["error"], found["q"].shape[:-1]
@@ -51,9 +51,10 @@ def solve_pose_fast(robot: Robot, targets: Mapping[str, Array], guess: State) ->
         np.ones(error.shape, dtype=int),
         found["worst"].astype(int),
     )
-    again = np.flatnonzero((found["sure"] < 0.5).any(axis=-1))
-    if not len(again):
+    open_ = found["sure"] < 0.5
+    if not open_.any():
         return solution
+    again = np.flatnonzero(open_.any(axis=-1))
     picked = {name: _picked(x, batch, again, _inner(x)) for name, x in targets.items()}
     rest = State(_picked(guess.T_world_base, batch, again, 2), _picked(guess.q, batch, again, 1))
     return solution.replaced(again, solve_pose(robot, picked, rest))
@@ -63,9 +64,11 @@ def _unwind(robot: Robot, tips: Sequence[str], found: dict[str, Array], guess: A
     """Take positions more than half a turn from the guess to the turn nearest to it, where limits allow."""
     q = found["q"].reshape(-1, len(robot.joints))
     near = np.broadcast_to(guess, found["q"].shape).reshape(q.shape)
-    rows = np.flatnonzero((np.abs(q - near) > np.pi).any(axis=1))
-    if not len(rows):
+    gap = q - near
+    far = np.abs(gap, out=gap) > np.pi
+    if not far.any():
         return
+    rows = np.flatnonzero(far.any(axis=1))
     q[rows] = unwound(robot.joints, q[rows], near[rows])
     for k, chain in enumerate(Chain.of(robot, tip) for tip in tips):
         own = q[rows][:, list(chain.joints)]

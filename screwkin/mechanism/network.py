@@ -66,7 +66,7 @@ def network_matrix(
     B = (mechanism.circuit_matrix if circuits is None else circuits).astype(float)
     signs = B.reshape(*(1 for _ in S.shape[:-2]), len(B), 1, B.shape[1])
     N = signs * S.swapaxes(-1, -2)[..., None, :, :]
-    return N.reshape(*S.shape[:-2], -1, len(mechanism.couplings))
+    return N.reshape(*S.shape[:-2], 6 * len(B), len(mechanism.couplings))
 
 
 def twist_rates(mechanism: Mechanism, twists: Sequence[Twist], rates: Sequence[Scalar]) -> list[Twist]:

@@ -123,15 +123,16 @@ def ordered(
         np.take_along_axis(a, order if a.ndim == 2 else order[..., None], axis=1)
         for a in (q, valid, inside, present, residual, iterations)
     )
+    shape = (*batch, q.shape[1])
     return LimbSolutions(
         chain.limb,
         chain.names,
         method,
-        np.where(present[..., None], q, np.nan).reshape(*batch, *q.shape[1:]),
-        valid.reshape(*batch, -1),
-        inside.reshape(*batch, -1),
-        np.where(present, residual, np.inf).reshape(*batch, -1),
-        iterations.reshape(*batch, -1),
+        np.where(present[..., None], q, np.nan).reshape(*shape, q.shape[2]),
+        valid.reshape(shape),
+        inside.reshape(shape),
+        np.where(present, residual, np.inf).reshape(shape),
+        iterations.reshape(shape),
     )
 
 

@@ -9,6 +9,8 @@ import screwkin as sk
 from screwkin.dynamics.newton_euler import GRAVITY
 from screwkin.kernel import body, limbs, native
 from screwkin.kernel.emit_python import source
+from screwkin.kernel.graph import FUNCTIONS
+from screwkin.kernel.program import Recorder
 from screwkin.kernel.run import chosen_path, python_function, run
 from tests.kinematics.machines import random_state, random_tree
 
@@ -37,7 +39,7 @@ def test_rates_and_tips_are_those_of_davies_method(name, path):
     inputs = {g.name: rng.uniform(-1, 1, (len(state.q), *g.shape)) for g in program.inputs}
     inputs |= {"T_world_base": upright.T_world_base, "q": upright.q}
     found = run(program, inputs, path=path)
-    wanted = {tip: inputs[tip] for tip in robot.tip_names}
+    wanted = {tip: inputs[f"twist_{tip}"] for tip in robot.tip_names}
     primary = sk.virtual_motion(mechanism, upright, inputs["base_twist"], wanted)
     rates = sk.secondary_rates(mechanism, upright, primary)
     real = [mechanism.secondary.index(joint) for joint in robot.joint_names]
@@ -68,10 +70,8 @@ def test_accelerations_are_the_slopes_of_the_rates(name):
         T[:, :3, 3] += h * v
         later["T_world_base"] = T
         later["q"] = inputs["q"] + h * found["qd"] + 0.5 * h * h * found["qdd"]
-        for tip in ("base", *robot.tip_names):
-            name, rate = (
-                ("base_twist", "base_acceleration") if tip == "base" else (tip, f"{tip}_acceleration")
-            )
+        tips = [(f"twist_{tip}", f"acceleration_{tip}") for tip in robot.tip_names]
+        for name, rate in [("base_twist", "base_acceleration"), *tips]:
             later[name] = inputs[name] + h * inputs[rate]
         return run(rates, {g.name: later[g.name] for g in rates.inputs}, path="numpy")["qd"]
 
@@ -133,7 +133,10 @@ def test_large_batches_give_what_small_ones_give(name):
     robot = sk.load_robot(name)
     state, _ = moving(robot, 1200)
     parts = [sk.State(state.T_world_base[i : i + 400], state.q[i : i + 400]) for i in (0, 400, 800)]
+    qd, twist = np.linspace(-2, 3, len(robot.joints)), np.linspace(-1, 1, 6)
     for ask in (
+        lambda s: sk.momentum(robot, s, qd),
+        lambda s: sk.momentum(robot, s, qd, twist),
         lambda s: sk.link_poses(robot, s),
         lambda s: sk.frame_pose(robot, s, robot.tip_names[0]),
         lambda s: sk.center_of_mass(robot, s),
@@ -159,6 +162,22 @@ def test_generated_python_is_a_module_that_stands_alone():
     expected = sk.frame_pose(robot, home, "left_foot")
     np.testing.assert_allclose(np.reshape(told[0], (2, 4, 4))[0], expected, atol=1e-14)
     assert "screwkin" not in source(program).split('"""', 2)[2], "the code itself imports math only"
+
+
+@pytest.mark.parametrize("count", [1, 3, 4, 5, 8, 19])
+@pytest.mark.parametrize("path", PATHS)
+def test_arrays_may_bear_any_name_and_batches_any_size(path, count):
+    """Names that C has a meaning for, results that are conditions, numbers or inputs."""
+    recorder = Recorder("odd", "Odd names.")
+    (a,), (b,) = recorder.input("samples", 1), recorder.input("int", 1)
+    recorder.input("unread", 2)
+    recorder.output("v0", [a + b, FUNCTIONS.where((a < b) | (b <= 0.0), a, FUNCTIONS.sqrt(b))])
+    recorder.output("first", [a < b, 3.0, b])
+    x, y = np.random.default_rng(count).uniform(-1, 1, (2, count, 1))
+    found = run(recorder.program(), {"samples": x, "int": y, "unread": np.zeros(2)}, path=path)
+    least = np.where((x < y) | (y <= 0), x, np.sqrt(np.abs(y)))
+    np.testing.assert_allclose(found["v0"], np.hstack([x + y, least]), rtol=1e-15)
+    np.testing.assert_array_equal(found["first"], np.hstack([x < y, np.full_like(x, 3), y]))
 
 
 def test_without_a_compiler_samples_are_computed_by_python_and_numpy(monkeypatch):
