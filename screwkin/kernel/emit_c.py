@@ -87,7 +87,8 @@ _BYTES = (("__AVX512F__", 64), ("__AVX2__", 32), ("__SSE2__", 16), ("__aarch64__
 
 def _prelude(real: Real) -> str:
     size, letter, magic = (8, "", "0x1.8p52") if real == "double" else (4, "f", "0x1.8p23")
-    high, low = map(_number, HALF_TURN)
+    single = (3.140625, math.pi - 3.140625)  # pi as HALF_TURN has it, the first with 8 bits
+    high, low = map(_number, HALF_TURN if real == "double" else single)
     widths = "\n".join(
         f"#elif defined({told})\n#define BYTES {width}\n"
         f"#define EACH(F) {{{', '.join(f'F({i})' for i in range(width // size))}}}"
