@@ -12,6 +12,7 @@ from screwkin.kernel.emit_python import source
 from screwkin.kernel.graph import FUNCTIONS
 from screwkin.kernel.program import Recorder
 from screwkin.kernel.run import chosen_path, python_function, run
+from screwkin.kernel.series import TURNS
 from tests.kinematics.machines import random_state, random_tree
 
 PATHS = ["python", "numpy", *(["C"] if native.compiler() else [])]
@@ -178,6 +179,22 @@ def test_arrays_may_bear_any_name_and_batches_any_size(path, count):
     least = np.where((x < y) | (y <= 0), x, np.sqrt(np.abs(y)))
     np.testing.assert_allclose(found["v0"], np.hstack([x + y, least]), rtol=1e-15)
     np.testing.assert_array_equal(found["first"], np.hstack([x < y, np.full_like(x, 3), y]))
+
+
+@pytest.mark.parametrize("path", PATHS)
+@pytest.mark.parametrize("far", [1.0, 7.0, 1e3, TURNS])
+def test_sines_and_angles_of_points_are_exact_to_rounding(path, far):
+    recorder = Recorder("angles", "Sines of an angle, and the angle of their point.")
+    (x,) = recorder.input("x", 1)
+    s, c = FUNCTIONS.sin(x), FUNCTIONS.cos(x)
+    recorder.output("told", [s, c, FUNCTIONS.atan2(s, c)])
+    quarters = np.pi / 2 * np.arange(-6, 7) * max(1.0, np.floor(far / 10))
+    angles = np.concatenate([np.random.default_rng(0).uniform(-far, far, 2000), quarters])
+    found = run(recorder.program(), {"x": angles[:, None]}, path=path)["told"]
+    np.testing.assert_allclose(found[:, 0], np.sin(angles), rtol=0, atol=7e-16)
+    np.testing.assert_allclose(found[:, 1], np.cos(angles), rtol=0, atol=7e-16)
+    expected = np.arctan2(found[:, 0], found[:, 1])
+    np.testing.assert_allclose(found[:, 2], expected, rtol=0, atol=1e-15)
 
 
 def test_without_a_compiler_samples_are_computed_by_python_and_numpy(monkeypatch):
