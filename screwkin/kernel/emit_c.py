@@ -205,7 +205,7 @@ INLINE pack angle(pack y, pack x)
     const pack ax = choose((mask)(x < R(0)), -x, x), ay = choose((mask)(y < R(0)), -y, y);
     const mask steeper = (mask)(ax < ay);
     const pack large = choose(steeper, ay, ax), small = choose(steeper, ax, ay);
-    const pack t = small / choose((mask)(large > R(0)), large, ALL(1));
+    const pack t = small / choose((mask)(large == R(0)), ALL(1), large);
     const pack steep = choose((mask)(t > R({math.tan(math.pi / 8)!r})), ALL(1), ALL(0));
     const pack z = (t - steep) / (R(1) + steep * t), u = z * z;
     const pack arc = z + z * u * {_horner(ARC, "u")} + steep * R({math.pi / 4!r});

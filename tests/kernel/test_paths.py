@@ -197,6 +197,17 @@ def test_sines_and_angles_of_points_are_exact_to_rounding(path, far):
     np.testing.assert_allclose(found[:, 2], expected, rtol=0, atol=1e-15)
 
 
+@pytest.mark.parametrize("path", PATHS)
+def test_what_has_no_value_is_infinite_or_no_number_on_every_path(path):
+    recorder = Recorder("beyond", "A reciprocal, a root, angles.")
+    (x,) = recorder.input("x", 1)
+    recorder.output("told", [1.0 / x, FUNCTIONS.sqrt(x), FUNCTIONS.atan2(1.0, x), FUNCTIONS.atan2(x, 1.0)])
+    found = run(recorder.program(), {"x": np.array([[0.0], [-1.0], [np.nan]])}, path=path)["told"]
+    eighth = np.pi / 4
+    wanted = [[np.inf, 0.0, 2 * eighth, 0.0], [-1.0, np.nan, 3 * eighth, -eighth], 4 * [np.nan]]
+    np.testing.assert_allclose(found, wanted, rtol=1e-15)
+
+
 def test_without_a_compiler_samples_are_computed_by_python_and_numpy(monkeypatch):
     monkeypatch.setattr(native, "compiler", lambda: None)
     program = body.mass_center(random_tree(99))
