@@ -147,13 +147,14 @@ def momentum(robot: Robot, state: State, qd: Any, base_twist: Any = None) -> Arr
         InputError: no link has a mass.
     """
     _check_mass(robot)
-    bodies, batch = _bodies(robot, state)
+    T, q, batch = parts(robot, state)
     if compiles(state, batch) and not (is_jax(qd) or is_jax(base_twist)):
         moving = {
             "qd": checked("qd", qd, len(robot.joints)),
             "base_twist": np.zeros(6) if base_twist is None else checked("base_twist", base_twist, 6),
         }
         return run(body.centroidal_momentum(robot), vars(state) | moving)["momentum"]
+    bodies = newton_euler.Bodies.of(robot, T.R, q)
     h = newton_euler.momentum(bodies, joint_scalars(robot, "qd", qd), twist_of("base_twist", base_twist))
     c = mass.center_of_mass(robot, bodies.poses)
     h = wrench_at(c, h)

@@ -169,8 +169,8 @@ def solve_pose(robot: Robot, targets: Mapping[str, Array], guess: State) -> Pose
     except ValueError:
         raise ShapeError(f"batches of base, targets and guess do not broadcast: {shapes}") from None
     count = int(np.prod(batch))
-    n = len(robot.joints)
-    q = np.broadcast_to(guess.q, (*batch, n)).reshape(count, n).astype(float)
+    size = len(robot.joints)
+    q = np.broadcast_to(guess.q, (*batch, size)).reshape(count, size).astype(float)
     T = np.broadcast_to(base, (*batch, 4, 4)).reshape(count, 4, 4)
     into = [Target(robot.limb(n), _in_base(T, np.asarray(targets[n], dtype=float), batch)) for n in names]
     if not into:
@@ -189,7 +189,7 @@ def solve_pose(robot: Robot, targets: Mapping[str, Array], guess: State) -> Pose
         _judge(robot, row, list(path), q, parts)
     shaped = {name: value.reshape(*batch, len(into)) for name, value in parts.items()}
     return PoseSolution(
-        State(T.reshape(*batch, 4, 4), q.reshape(*batch, n)),
+        State(T.reshape(*batch, 4, 4), q.reshape(*batch, size)),
         tuple(target.limb.name for target in into),
         shaped["status"].astype(int),
         shaped["residual"],
