@@ -25,6 +25,7 @@ from benchmarks.environments import ROOT
 from benchmarks.machine import description, version_of
 from benchmarks.report import time_told
 from screwkin.kernel import body, limbs
+from screwkin.kernel.motion import motion
 from screwkin.kernel.pose import closed_targets
 from screwkin.kernel.program import Program
 from screwkin.kernel.records import identifier
@@ -67,10 +68,10 @@ def inputs(robot: Robot, count: int) -> Iterator[tuple[Program, dict[str, Array]
     rng, given = np.random.default_rng(2), workloads.motion(robot, count)
     state = {"T_world_base": given.T_world_base, "q": given.q}
     rates = {"base_twist": given.waist, **{identifier("twist", tip): x for tip, x in given.tips.items()}}
-    yield body.motion(robot), state | rates
+    yield motion.program(robot), state | rates
     second = {"qd": rng.uniform(-1, 1, given.q.shape), "qdd": rng.uniform(-1, 1, given.q.shape)}
     second |= {"base_twist": given.waist, "base_acceleration": rng.uniform(-1, 1, (count, 6))}
-    yield body.balance(robot), state | second
+    yield body.balance.program(robot), state | second
     reach = workloads.random_reach(robot, count)
     guess = np.broadcast_to(reach.guess, (count, len(reach.guess)))
     yield limbs.limb_nearest(robot, reach.limb.name), {"T_base_tip": reach.target, "guess": guess}

@@ -14,6 +14,7 @@ from screwkin.analysis.workspace import workspace
 from screwkin.gait.balance import ground_reaction
 from screwkin.kernel import body, limbs
 from screwkin.kernel.emit_python import run_numpy
+from screwkin.kernel.motion import motion
 from screwkin.kernel.native import THREADED_FROM
 from screwkin.kernel.program import Program
 from screwkin.kernel.records import identifier
@@ -43,7 +44,7 @@ def rates(robot: Robot, given: Motion) -> Contestants:
 
 def _rate_kernels(robot: Robot, given: Motion) -> Contestants:
     """The same by the compiled program, on every path that this computer has."""
-    program = body.motion(robot)
+    program = motion.program(robot)
     told = {"T_world_base": given.T_world_base, "q": given.q, "base_twist": given.waist}
     told |= {identifier("twist", tip): values for tip, values in given.tips.items()}
     count = len(given.q)
@@ -142,7 +143,7 @@ def balance(robot: Robot, given: Dynamic) -> Contestants:
         )
         return {"com": com, "momentum": sk.momentum(robot, state, given.qd, given.twist), "zmp": zmp}
 
-    program = body.balance(robot)
+    program = body.balance.program(robot)
     told = {"T_world_base": given.T_world_base, "q": given.q, "qd": given.qd, "qdd": given.qdd}
     told |= {"base_twist": given.twist, "base_acceleration": given.acceleration}
     contestants = {f"{NAME}, public functions": Contestant(run)}

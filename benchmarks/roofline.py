@@ -109,13 +109,14 @@ def bandwidth(count: int) -> float:
 def bounds(robot: Any) -> list[Bound]:
     """The kernels of rates, balance and inverse kinematics."""
     from screwkin.kernel import body, limbs
+    from screwkin.kernel.motion import motion
     from screwkin.kernel.run import machine_code
 
     limb = next(limb.name for limb in robot.limbs if limb.kind == "leg")
     programs = [
-        body.tip_poses(robot),
-        body.motion(robot),
-        body.balance(robot),
+        body.tip_poses.program(robot),
+        motion.program(robot),
+        body.balance.program(robot),
         limbs.limb_nearest(robot, limb),
     ]
     rng, speed, rows = np.random.default_rng(0), peak(), []

@@ -1,18 +1,17 @@
-"""Arrays at the door: shapes, kinds and values checked, then taken apart into scalars."""
+"""Arrays at the door: shapes, kinds and values checked."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from screwkin.errors import ShapeError
 from screwkin.kernel.rigid import deviation
-from screwkin.kernel.run import FROM
 from screwkin.model.robot import Robot
-from screwkin.model.state import RIGID, State, not_rigid
+from screwkin.model.state import RIGID, State
 from screwkin.scalar import is_jax
-from screwkin.se3 import NO_TWIST, Pose, Twist, pose_from_array, twist_from_array, unstack
 
 Array = Any
 
@@ -49,7 +48,7 @@ def rigid(name: str, T: Array) -> Array:
     """
     if is_jax(T):
         return T
-    bad = not_rigid(T) if T.size < 16 * FROM else deviation(T) > RIGID
+    bad = deviation(T) > RIGID
     if bad.any():
         sample = tuple(int(i) for i in np.argwhere(bad)[0])
         raise ShapeError(
@@ -59,29 +58,34 @@ def rigid(name: str, T: Array) -> Array:
     return T
 
 
-def parts(robot: Robot, state: State) -> tuple[Pose, list[Any], tuple[int, ...]]:
-    """Base pose, joint scalars and batch shape of a checked state."""
-    T = checked("state.T_world_base", state.T_world_base, 4, 4)
-    q = checked("state.q", state.q, len(robot.joints))
+def told(robot: Robot, state: State, **more: tuple[Any, int]) -> dict[str, Array]:
+    """The inputs of a formula, checked: a state and more arrays with the size of their last axis.
+
+    None stands for zeros.
+
+    Raises:
+        ShapeError: a wrong shape, NaN or infinity, a base pose that is not rigid, or batches that do not fit.
+    """
+    found = {
+        "T_world_base": checked("state.T_world_base", state.T_world_base, 4, 4),
+        "q": checked("state.q", state.q, len(robot.joints)),
+    }
+    for name, (value, size) in more.items():
+        found[name] = np.zeros(size) if value is None else checked(name, value, size)
+    one_batch({"T_world_base": 2}, found)
+    rigid("state.T_world_base", found["T_world_base"])
+    return found
+
+
+def one_batch(inner: Mapping[str, int], arrays: Mapping[str, Array]) -> tuple[int, ...]:
+    """The batch to which arrays broadcast, with ``inner`` axes behind it (one where nothing is said).
+
+    Raises:
+        ShapeError: there is none.
+    """
+    batches = {name: a.shape[: a.ndim - inner.get(name, 1)] for name, a in arrays.items()}
     try:
-        batch = np.broadcast_shapes(T.shape[:-2], q.shape[:-1])
+        return np.broadcast_shapes(*batches.values())
     except ValueError:
-        raise ShapeError(
-            f"batch of state.T_world_base {T.shape[:-2]} and of state.q {q.shape[:-1]} do not broadcast"
-        ) from None
-    return pose_from_array(rigid("state.T_world_base", T)), unstack(q), batch
-
-
-def compiles(state: State, batch: tuple[int, ...]) -> bool:
-    """True where a program computes rather than the formula itself: a large batch of NumPy arrays."""
-    return not (is_jax(state.T_world_base) or is_jax(state.q)) and int(np.prod(batch)) >= FROM
-
-
-def joint_scalars(robot: Robot, name: str, values: Any) -> list[Any]:
-    """One scalar per joint from a checked (..., n) array."""
-    return unstack(checked(name, values, len(robot.joints)))
-
-
-def twist_of(name: str, value: Any) -> Twist:
-    """A Twist from a checked (..., 6) array; None is rest."""
-    return NO_TWIST if value is None else twist_from_array(checked(name, value, 6))
+        each = " and of ".join(f"{name} {batch}" for name, batch in batches.items() if batch)
+        raise ShapeError(f"batch of {each} do not broadcast") from None

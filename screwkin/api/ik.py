@@ -11,7 +11,6 @@ from screwkin.errors import InputError, ShapeError
 from screwkin.kernel.branches import limb_solutions
 from screwkin.kernel.limbs import solvable
 from screwkin.kernel.rigid import nearest_poses
-from screwkin.kernel.run import FROM
 from screwkin.model.robot import Robot
 from screwkin.model.state import RIGID
 from screwkin.solve.branches import LimbSolutions
@@ -75,7 +74,7 @@ def limb_ik(
     shape = target.shape[target.ndim - around :]
     flat = np.broadcast_to(target, (*batch, *shape)).reshape(count, *shape)
     flat_start = np.broadcast_to(start, (*batch, start.shape[-1])).reshape(count, start.shape[-1])
-    if count >= FROM and poses and (method == "closed" or (method == "auto" and solvable(robot, limb, True))):
+    if poses and (method == "closed" or (method == "auto" and solvable(robot, limb, True))):
         return limb_solutions(robot, chain.limb, flat, flat_start, batch, least_squares)
     return solve_limb(chain, flat, method, flat_start, settings or IkSettings(), batch, least_squares)
 
@@ -86,7 +85,7 @@ def rigid(T: Array) -> Array:
     Raises:
         InputError: a matrix is no pose.
     """
-    wrong, exact = nearest_poses(T) if T.size >= 16 * FROM else _nearest(T)
+    wrong, exact = nearest_poses(T)
     if wrong.size and wrong.max() > RIGID:
         sample = int(wrong.argmax())
         raise InputError(
@@ -94,17 +93,6 @@ def rigid(T: Array) -> Array:
             "row 0 0 0 1"
         )
     return exact
-
-
-def _nearest(T: Array) -> tuple[Array, Array]:
-    """As ``kernel.rigid.nearest_poses``."""
-    R = T[..., :3, :3]
-    wrong = np.abs(R.swapaxes(-1, -2) @ R - np.eye(3)).max(axis=(-1, -2), initial=0.0)
-    wrong = np.maximum(wrong, np.abs(T[..., 3, :] - [0, 0, 0, 1]).max(axis=-1, initial=0.0))
-    exact = T.copy()
-    for _ in range(2):
-        exact[..., :3, :3] = R = 1.5 * R - 0.5 * R @ R.swapaxes(-1, -2) @ R
-    return np.where(np.linalg.det(T[..., :3, :3]) > 0, wrong, np.inf), exact
 
 
 def _default_guess(robot: Robot, chain: Chain) -> Array:

@@ -7,10 +7,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from screwkin.api.arrays import Array, checked, compiles, parts, rigid, twist_of
+from screwkin.api.arrays import Array, checked, one_batch, rigid, told
 from screwkin.api.body import home
 from screwkin.errors import InputError, UnknownNameError
+from screwkin.kernel import davies
 from screwkin.kernel.pose import solve_pose_fast
+from screwkin.kernel.records import identifier
 from screwkin.kernel.secondary import secondary_rates as kernel_rates
 from screwkin.mechanism import network
 from screwkin.mechanism import virtual_motion as virtual
@@ -18,7 +20,6 @@ from screwkin.mechanism.mechanism import Mechanism
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 from screwkin.scalar import is_jax
-from screwkin.se3 import ZERO, Twist, as_array, vector_from_array
 from screwkin.solve import rates
 from screwkin.solve.pose import PoseSolution
 from screwkin.solve.pose import solve_pose as newton_pose
@@ -37,11 +38,10 @@ def network_matrix(mechanism: Mechanism, state: State, point: Any = None) -> Arr
 
     Source: paper A, eq. 8-9.
     """
-    T, q, batch = parts(mechanism.robot, state)
-    p = ZERO if point is None else vector_from_array(checked("point", point, 3)) - T.p
-    if point is not None:
-        batch = np.broadcast_shapes(batch, np.shape(point)[:-1])
-    return network.network_matrix(mechanism, network.coupling_twists(mechanism, T.R, q, p), batch)
+    at = {} if point is None else {"point": (point, 3)}
+    choice = mechanism.robot, mechanism.primary, mechanism.secondary
+    found = davies.coupling_screws(*choice, point is None, told=told(mechanism.robot, state, **at))
+    return network.assembled(mechanism, found["S"])
 
 
 def virtual_motion(
@@ -61,28 +61,29 @@ def virtual_motion(
 
     Source: paper A, eq. 7.
     """
-    T, q, batch = parts(mechanism.robot, state)
-    twists: dict[str, Twist] = {}
+    moving, whole = dict[str, tuple[Any, int]](), []
     chains = virtual.imposing_chains(mechanism)
     for chain in chains:
         wanted = [name for name in chain.names if name in mechanism.primary]
         given = base_twist if chain.limb is None else tip_twists.get(chain.name)
         if given is None:
             raise InputError(f"tip_twists lacks {chain.name}, but {', '.join(wanted)} are primary")
-        if np.shape(given)[-1:] == (3,):
-            if any(name.split(".")[1][0] == "r" for name in wanted):
-                raise InputError(f"the twist of {chain.name} has 3 components, but its rotations are primary")
-            twists[chain.name] = Twist(ZERO, vector_from_array(checked(chain.name, given, 3)))
-        else:
-            twists[chain.name] = twist_of(chain.name, given)
+        size = 3 if np.shape(given)[-1:] == (3,) else 6
+        if size == 6:
+            whole.append(chain.name)
+        elif any(name.split(".")[1][0] == "r" for name in wanted):
+            raise InputError(f"the twist of {chain.name} has 3 components, but its rotations are primary")
+        moving[chain.name] = (given, size)
     virtually = {name for chain in chains for name in chain.names}
     real = [name for name in mechanism.primary if name not in virtually]
     if real:
         raise InputError(
             f"primary couplings {', '.join(real)} belong to no virtual chain; give their rates directly"
         )
-    motion = virtual.primary_motion(mechanism, T, q, twists)
-    return as_array([motion[name] for name in mechanism.primary], batch)
+    inputs = told(mechanism.robot, state, **moving)
+    inputs |= {identifier("twist", name): inputs.pop(name) for name in moving}
+    choice = mechanism.robot, mechanism.primary, mechanism.secondary
+    return davies.primary_rates(*choice, tuple(whole), told=inputs)["primary"]
 
 
 def secondary_rates(
@@ -118,23 +119,21 @@ def secondary_rates(
 
 
 def _by_program(mechanism: Mechanism, state: State, primary: Array) -> Array | None:
-    """Secondary rates of a large batch without singular sample by the kernel; None where that is not so."""
+    """Secondary rates of samples none of which is singular by the kernel; None where that is not so."""
     if is_jax(primary):
         return None
-    T, q = np.asarray(state.T_world_base), np.asarray(state.q)
-    try:
-        batch = np.broadcast_shapes(T.shape[:-2], q.shape[:-1], primary.shape[:-1])
-    except ValueError:
+    arrays = told(mechanism.robot, state)
+    if any(map(is_jax, arrays.values())):
         return None
-    if not compiles(state, batch):
-        return None
-    parts(mechanism.robot, state)
-    flat = (
-        np.broadcast_to(a, (*batch, *a.shape[a.ndim - inner :])).reshape(-1, *a.shape[a.ndim - inner :])
-        for a, inner in ((T, 2), (q, 1), (primary, 1))
-    )
+    arrays["primary_rates"] = primary
+    inner = {"T_world_base": 2}
+    batch = one_batch(inner, arrays)
+    flat = []
+    for name, a in arrays.items():
+        shape = a.shape[a.ndim - inner.get(name, 1) :]
+        flat.append(np.broadcast_to(a, (*batch, *shape)).reshape(-1, *shape))
     values = kernel_rates(mechanism, *flat)
-    return None if values is None else values.reshape(*batch, -1)
+    return None if values is None else values.reshape(*batch, len(mechanism.secondary))
 
 
 def _status(singular: Array, batch: tuple[int, ...]) -> Array:
@@ -184,5 +183,7 @@ def solve_pose(
     base = checked("guess.T_world_base", guess.T_world_base, 4, 4)
     base = base if "base" in wanted else rigid("guess.T_world_base", base)
     q = checked("guess.q", guess.q, len(robot.joints))
+    arrays = wanted | {"guess.T_world_base": base, "guess.q": q}
+    one_batch({name: 2 for name, a in arrays.items() if np.shape(a)[-2:] == (4, 4)}, arrays)
     start = State(np.asarray(base, dtype=float), np.asarray(q, dtype=float))
     return (solve_pose_fast if method == "auto" else newton_pose)(robot, wanted, start)

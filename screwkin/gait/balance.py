@@ -8,17 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from screwkin.dynamics.newton_euler import GRAVITY, Bodies, ground_wrench
 from screwkin.dynamics.support import Spike, sole_corners, spikes
-from screwkin.dynamics.zmp import cart_table_zmp, zmp_from_wrench
 from screwkin.errors import InputError
-from screwkin.kernel.body import balance as compiled_balance
+from screwkin.kernel.body import balance
 from screwkin.kernel.margin import support_margin_fast
-from screwkin.kernel.run import FROM, run
-from screwkin.kinematics.mass import center_of_mass
 from screwkin.model.robot import Robot
-from screwkin.screw import wrench_at
-from screwkin.se3 import Twist, Vector, as_array, pose_from_array, twist_from_array, unstack
 from screwkin.trajectory import Trajectory
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -76,25 +70,9 @@ def ground_reaction(
         twist: [omega; v of the base origin] (T, 6), world axes.
         acceleration: its time derivative (T, 6).
     """
-    if len(q) >= FROM:
-        told = {"T_world_base": T_world_base, "q": q, "qd": qd, "qdd": qdd}
-        found = run(compiled_balance(robot), told | {"base_twist": twist, "base_acceleration": acceleration})
-        return found["zmp"], found["com"], found["wrench"], found["cart_table"]
-    T, scalars, batch = pose_from_array(T_world_base), unstack(q), (len(q),)
-    bodies = Bodies.of(robot, T.R, scalars)
-    wrench = ground_wrench(
-        bodies, unstack(qd), unstack(qdd), twist_from_array(twist), twist_from_array(acceleration), GRAVITY
-    )
-    com = T.p + center_of_mass(robot, bodies.poses)
-    rise = wrench.f * (1.0 / robot.mass)
-    cart = cart_table_zmp(com, Vector(rise.x, rise.y, rise.z - GRAVITY), GRAVITY)
-    about = wrench_at(-T.p, wrench)
-    return (
-        as_array(zmp_from_wrench(wrench, T.p), batch)[..., :2],
-        as_array(com, batch),
-        as_array(Twist(about.m, about.f), batch),
-        as_array(cart, batch)[..., :2],
-    )
+    told = {"T_world_base": T_world_base, "q": q, "qd": qd, "qdd": qdd}
+    found = balance(robot, told=told | {"base_twist": twist, "base_acceleration": acceleration})
+    return found["zmp"], found["com"], found["wrench"], found["cart_table"]
 
 
 def ground_margin(zmp: Array, com: Array, wrench: Array, soles: Array, contact: Array) -> Array:

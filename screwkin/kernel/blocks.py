@@ -7,11 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from screwkin.kernel.davies import mechanism_of
 from screwkin.kernel.program import Program, Recorder
 from screwkin.kernel.records import identifier, pose_input
 from screwkin.kernel.run import run
 from screwkin.mechanism.choice import characteristic_length
-from screwkin.mechanism.mechanism import Mechanism, coupling_graph, virtual_chains
+from screwkin.mechanism.mechanism import Mechanism
 from screwkin.mechanism.network import coupling_twists, network_matrix
 from screwkin.model.robot import Robot
 from screwkin.scalar import Scalar, where
@@ -83,12 +84,6 @@ def block_values(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, .
     recorder.output("least", [value for value, _ in found])
     recorder.output("sure", [where(error <= TRUSTED, 1.0, 0.0) for _, error in found])
     return recorder.program()
-
-
-def mechanism_of(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, ...]) -> Mechanism:
-    """The mechanism of a robot with a choice that has been checked."""
-    chains = virtual_chains(robot)
-    return Mechanism(robot, chains, coupling_graph(robot, chains), primary, secondary, len(primary))
 
 
 def small(mechanism: Mechanism) -> bool:

@@ -1,196 +1,203 @@
-"""Kernels of the whole body: poses, Jacobians, rates and accelerations, centre of mass and ZMP.
+"""Formulas of the whole body on a tape: poses, Jacobians, dynamics, ZMP.
 
-Each runs the public formulas once on graph scalars and is a ``Program`` with named inputs and outputs.
+Every one is the public function of the same name, or a part of it, without its checks.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import cache
+from collections.abc import Sequence
 
-from screwkin.dynamics.newton_euler import GRAVITY, Bodies, ground_wrench, momentum
+from screwkin.dynamics import newton_euler
+from screwkin.dynamics.newton_euler import GRAVITY, Bodies
 from screwkin.dynamics.zmp import cart_table_zmp, zmp_from_wrench
-from screwkin.kernel.program import Program, Recorder
+from screwkin.kernel.formula import Formula, Tape
 from screwkin.kernel.records import identifier, matrix, pose_input, twist_input
-from screwkin.kinematics import positions
-from screwkin.kinematics.mass import center_of_mass
+from screwkin.kinematics import mass, positions
 from screwkin.model.robot import Robot
 from screwkin.scalar import Scalar
-from screwkin.screw import Displacement, at, wrench_at
-from screwkin.se3 import ZERO, Pose, Twist, Vector
-from screwkin.solve.limb_motion import LimbMotion
+from screwkin.screw import at, wrench_at
+from screwkin.se3 import NO_TWIST, ZERO, Pose, Twist, Vector, X, Y, Z
+
+BASIS = (*(Twist(e, ZERO) for e in (X, Y, Z)), *(Twist(ZERO, e) for e in (X, Y, Z)))
 
 
-@cache
-def tip_poses(robot: Robot) -> Program:
+def _state(tape: Tape, robot: Robot) -> tuple[Pose, list[Scalar]]:
+    return pose_input(tape, "T_world_base"), tape.input("q", len(robot.joints))
+
+
+def _give_poses(tape: Tape, name: str, poses: Sequence[Pose]) -> None:
+    tape.output(name, [x for pose in poses for x in matrix(pose)], len(poses), 4, 4)
+
+
+def _give_columns(tape: Tape, name: str, columns: Sequence[Sequence[Scalar]]) -> None:
+    rows = list(zip(*columns, strict=True))
+    tape.output(name, [x for row in rows for x in row], len(rows), len(columns))
+
+
+@Formula
+def tip_poses(tape: Tape, robot: Robot) -> None:
     """World poses of all tips."""
-    return _poses(robot, "tip", lambda D: [positions.frame_pose(robot, D, limb.tip) for limb in robot.limbs])
+    tape.title(identifier(robot.name, "tips"), f"World poses of the tips of {robot.name}.")
+    T, q = _state(tape, robot)
+    D = positions.link_displacements(robot, q)
+    _give_poses(tape, "T_world_tip", [T @ positions.frame_pose(robot, D, x.tip) for x in robot.limbs])
 
 
-@cache
-def link_poses(robot: Robot) -> Program:
+@Formula
+def link_poses(tape: Tape, robot: Robot) -> None:
     """World poses of all links."""
-    return _poses(robot, "link", lambda D: [d @ x.frame for d, x in zip(D, robot.links, strict=True)])
+    tape.title(identifier(robot.name, "links"), f"World poses of the links of {robot.name}.")
+    T, q = _state(tape, robot)
+    D = positions.link_displacements(robot, q)
+    _give_poses(tape, "T_world_link", [T @ (d @ x.frame) for d, x in zip(D, robot.links, strict=True)])
 
 
-def _poses(robot: Robot, what: str, of: Callable[[Sequence[Displacement]], list[Pose]]) -> Program:
-    recorder = Recorder(identifier(robot.name, f"{what}s"), f"World poses of the {what}s of {robot.name}.")
-    T, q = pose_input(recorder, "T_world_base"), recorder.input("q", len(robot.joints))
-    poses = [T @ pose for pose in of(positions.link_displacements(robot, q))]
-    recorder.output(f"T_world_{what}", [x for pose in poses for x in matrix(pose)], len(poses), 4, 4)
-    return recorder.program()
+@Formula
+def frame_pose(tape: Tape, robot: Robot, frame: str) -> None:
+    """World pose of the base, a link or a tip."""
+    tape.title(identifier(robot.name, frame, "pose"), f"World pose of {frame} of {robot.name}.")
+    T, q = _state(tape, robot)
+    pose = T @ positions.frame_pose(robot, positions.link_displacements(robot, q), frame)
+    tape.output("T_world_frame", matrix(pose), 4, 4)
 
 
-@cache
-def mass_center(robot: Robot) -> Program:
-    """World position of the centre of mass."""
-    recorder = Recorder(identifier(robot.name, "com"), f"Centre of mass of {robot.name}, in the world.")
-    T, q = pose_input(recorder, "T_world_base"), recorder.input("q", len(robot.joints))
-    recorder.output("com", T @ center_of_mass(robot, positions.link_displacements(robot, q)))
-    return recorder.program()
+@Formula
+def jacobian(tape: Tape, robot: Robot, frame: str, own: bool) -> None:
+    """Screw Jacobian of a frame at its own origin, or at a point of the world."""
+    tape.title(
+        identifier(robot.name, frame, "jacobian", "" if own else "at_point"),
+        f"Jacobian of {frame} of {robot.name}: rows [omega; v at {'its origin' if own else 'the point'}],"
+        " world axes; columns: twist of the base at the same point, joint rates.",
+    )
+    T, q = _state(tape, robot)
+    D, turned = positions.link_displacements(robot, q), Pose(T.R, ZERO)
+    p = (turned @ positions.frame_pose(robot, D, frame)).p if own else Vector(*tape.input("point", 3)) - T.p
+    columns = positions.frame_jacobian(robot, positions.joint_twists(robot, D, turned), frame)
+    joints = [at(p, columns[i]) if i in columns else NO_TWIST for i in range(len(q))]
+    _give_columns(tape, "J", [[*c.omega, *c.v] for c in (*BASIS, *joints)])
 
 
-@cache
-def limb_jacobian(robot: Robot, limb: str) -> Program:
+@Formula
+def limb_jacobian(tape: Tape, robot: Robot, limb: str) -> None:
     """Compact Jacobian of a tip: one column for every joint of its limb."""
     chosen = robot.limb(limb)
-    path = robot.path_to(chosen.link)
-    recorder = Recorder(
+    tape.title(
         identifier(robot.name, chosen.name, "jacobian"),
         f"Jacobian of {chosen.tip} of {robot.name}: rows [omega; v of the tip's origin], base axes; a column"
         " for every joint of the limb.",
     )
-    q = recorder.input("q", len(robot.joints))
+    q = tape.input("q", len(robot.joints))
     D = positions.link_displacements(robot, q)
     tip = positions.frame_pose(robot, D, chosen.tip).p
     screws = positions.joint_screws(robot, D)
-    columns = [at(tip, screws[i].twist) for i in path]
-    rows = zip(*([*c.omega, *c.v] for c in columns), strict=True)
-    recorder.output("J", [x for row in rows for x in row], 6, len(path))
-    return recorder.program()
+    columns = [at(tip, screws[i].twist) for i in robot.path_to(chosen.link)]
+    _give_columns(tape, "J", [[*c.omega, *c.v] for c in columns])
 
 
-def follows(robot: Robot, secondary: Sequence[str]) -> bool:
-    """True if all joints follow the tips of limbs that share none: six joints a pose, three a position.
+@Formula
+def center_of_mass(tape: Tape, robot: Robot) -> None:
+    """World position of the centre of mass."""
+    tape.title(identifier(robot.name, "com"), f"Centre of mass of {robot.name}, in the world.")
+    T, q = _state(tape, robot)
+    tape.output("com", T @ mass.center_of_mass(robot, positions.link_displacements(robot, q)))
 
-    Args:
-        robot: the robot.
-        secondary: names of the couplings that follow.
-    """
-    paths = [robot.path_to(limb.link) for limb in robot.limbs]
-    used = sorted(i for path in paths for i in path)
-    return (
-        used == list(range(len(robot.joints)))
-        and all(len(path) in (3, 6) for path in paths)
-        and not robot.closures
-        and set(robot.joint_names) <= set(secondary)
+
+@Formula
+def com_jacobian(tape: Tape, robot: Robot) -> None:
+    """Velocity of the centre of mass for the base's twist and every joint rate."""
+    tape.title(
+        identifier(robot.name, "com_jacobian"),
+        f"Jacobian of the centre of mass of {robot.name}, world axes; columns: twist of the base at its"
+        " origin, joint rates.",
     )
+    T, q = _state(tape, robot)
+    turned = Pose(T.R, ZERO)
+    local = positions.link_displacements(robot, q)
+    D, twists = [turned @ d for d in local], positions.joint_twists(robot, local, turned)
+    c = mass.center_of_mass(robot, D)
+    spin = [at(c, twist).v for twist in BASIS]
+    _give_columns(tape, "J", [list(v) for v in (*spin, *mass.com_jacobian(robot, D, twists))])
 
 
-@cache
-def motion(robot: Robot, accelerations: bool = False) -> Program:
-    """Joint rates (and accelerations) from those of base and tips; tips' poses on the way.
-
-    Limbs of six joints follow the twist of their tip, those of three joints its origin's velocity.
-    """
-    what = "rates and accelerations" if accelerations else "rates"
-    recorder = Recorder(
-        identifier(robot.name, "motion" if accelerations else "rates"),
-        f"Joint {what} of {robot.name} that move base and tips as wanted, and the tips' poses; world axes,"
-        " twists [omega; v of the body's origin].",
-    )
-    T, q = pose_input(recorder, "T_world_base"), recorder.input("q", len(robot.joints))
-    sizes = [6 if len(robot.path_to(limb.link)) == 6 else 3 for limb in robot.limbs]
-
-    def told(name: str, size: int) -> Twist:
-        x = recorder.input(name, size)
-        return Twist(Vector(*x[:3]) if size == 6 else ZERO, Vector(*x[-3:]))
-
-    base = told("base_twist", 6)
-    tips = [told(identifier("twist", limb.tip), size) for limb, size in zip(robot.limbs, sizes, strict=True)]
-    D = positions.link_displacements(robot, q, Displacement(T.R, ZERO, ZERO))
-    limbs = [LimbMotion.of(robot, limb, D, q, best_link(robot, limb.name)) for limb in robot.limbs]
-    qd: dict[int, Scalar] = {}
-    qdd: dict[int, Scalar] = {}
-    solved = [limb.rates(base, tip) for limb, tip in zip(limbs, tips, strict=True)]
-    for limb, (rates, _) in zip(limbs, solved, strict=True):
-        qd.update(zip(limb.path, rates, strict=True))
-    if accelerations:
-        base_rate = told("base_acceleration", 6)
-        for limb, tip, size, name in zip(limbs, tips, sizes, robot.tip_names, strict=True):
-            second = told(identifier("acceleration", name), size)
-            found = limb.accelerations(base, tip, base_rate, second, [qd[i] for i in limb.path])
-            qdd.update(zip(limb.path, found, strict=True))
-    poses = [Pose(limb.tip.R, T.p + limb.tip.p) for limb in limbs]
-    recorder.output("T_world_tip", [x for pose in poses for x in matrix(pose)], len(poses), 4, 4)
-    order = range(len(robot.joints))
-    recorder.output("qd", [qd[i] for i in order])
-    if accelerations:
-        recorder.output("qdd", [qdd[i] for i in order])
-    recorder.output("determinant", [determinant for _, determinant in solved])
-    return recorder.program()
-
-
-@cache
-def best_link(robot: Robot, limb: str) -> int:
-    """After how many joints of a limb the link stands in whose axes its rates take least.
-
-    Of links amid the limb, by the number of operations.
-    """
-
-    def cost(joints: int) -> int:
-        recorder = Recorder("trial", "")
-        q = recorder.input("q", len(robot.joints))
-        base, tip = twist_input(recorder, "base"), twist_input(recorder, "tip")
-        R = pose_input(recorder, "T").R
-        D = positions.link_displacements(robot, q, Displacement(R, ZERO, ZERO))
-        rates, _ = LimbMotion.of(robot, robot.limb(limb), D, q, joints).rates(base, tip)
-        recorder.output("rates", rates)
-        return recorder.program().operations
-
-    joints = len(robot.path_to(robot.limb(limb).link))
-    return min(range(joints // 3, joints // 2 + 2), key=cost)
-
-
-@cache
-def centroidal_momentum(robot: Robot) -> Program:
+@Formula
+def momentum(tape: Tape, robot: Robot) -> None:
     """Momentum [angular about the CoM; linear], world axes."""
-    recorder = Recorder(
+    tape.title(
         identifier(robot.name, "momentum"),
         f"Momentum of {robot.name} [angular about the centre of mass; linear], world axes.",
     )
-    n = len(robot.joints)
-    T, q, qd = pose_input(recorder, "T_world_base"), recorder.input("q", n), recorder.input("qd", n)
+    T, q = _state(tape, robot)
+    qd, twist = tape.input("qd", len(q)), twist_input(tape, "base_twist")
     bodies = Bodies.of(robot, T.R, q)
-    h = momentum(bodies, qd, twist_input(recorder, "base_twist"))
-    h = wrench_at(center_of_mass(robot, bodies.poses), h)
-    recorder.output("momentum", [*h.m, *h.f])
-    return recorder.program()
+    h = newton_euler.momentum(bodies, qd, twist)
+    h = wrench_at(mass.center_of_mass(robot, bodies.poses), h)
+    tape.output("momentum", [*h.m, *h.f])
 
 
-@cache
-def balance(robot: Robot) -> Program:
+@Formula
+def mass_matrix(tape: Tape, robot: Robot) -> None:
+    """Mass matrix for [base twist at the base origin, world axes; joint rates]."""
+    tape.title(
+        identifier(robot.name, "mass_matrix"),
+        f"Mass matrix of {robot.name} for [twist of the base at its origin, world axes; joint rates].",
+    )
+    T, q = _state(tape, robot)
+    _give_columns(tape, "M", newton_euler.mass_matrix(Bodies.of(robot, T.R, q)))
+
+
+def _motion(tape: Tape, robot: Robot) -> tuple[list[Scalar], list[Scalar], Twist, Twist]:
+    """Rates and accelerations of joints and base."""
+    n = len(robot.joints)
+    qd, qdd = tape.input("qd", n), tape.input("qdd", n)
+    return qd, qdd, twist_input(tape, "base_twist"), twist_input(tape, "base_acceleration")
+
+
+@Formula
+def inverse_dynamics(tape: Tape, robot: Robot) -> None:
+    """Wrench on the base about its origin, and torques of the joints."""
+    tape.title(
+        identifier(robot.name, "inverse_dynamics"),
+        f"Wrench [m; f] on the base of {robot.name} about its origin, world axes, and efforts of the joints.",
+    )
+    T, q = _state(tape, robot)
+    moving, (gravity,) = _motion(tape, robot), tape.input("gravity", 1)
+    wrench, torques = newton_euler.inverse_dynamics(Bodies.of(robot, T.R, q), *moving, gravity)
+    tape.output("force", [*wrench.m, *wrench.f, *torques])
+
+
+@Formula
+def ground_wrench(tape: Tape, robot: Robot) -> None:
+    """Wrench that the ground must give, about the world origin."""
+    tape.title(
+        identifier(robot.name, "ground_wrench"),
+        f"Wrench [m; f] that the ground gives {robot.name}, about the world origin, world axes.",
+    )
+    T, q = _state(tape, robot)
+    moving, (gravity,) = _motion(tape, robot), tape.input("gravity", 1)
+    wrench = wrench_at(-T.p, newton_euler.ground_wrench(Bodies.of(robot, T.R, q), *moving, gravity))
+    tape.output("wrench", [*wrench.m, *wrench.f])
+
+
+@Formula
+def balance(tape: Tape, robot: Robot) -> None:
     """CoM, centroidal momentum, ground wrench, ZMP and the cart-table's ZMP."""
-    recorder = Recorder(
+    tape.title(
         identifier(robot.name, "zmp"),
         "Centre of mass, momentum [angular about it; linear], ground wrench [m; f] about the world origin,"
         f" ZMP and cart-table ZMP of {robot.name}; world axes.",
     )
-    n = len(robot.joints)
-    T, q = pose_input(recorder, "T_world_base"), recorder.input("q", n)
-    qd, qdd = recorder.input("qd", n), recorder.input("qdd", n)
-    twist, rate = twist_input(recorder, "base_twist"), twist_input(recorder, "base_acceleration")
+    T, q = _state(tape, robot)
+    qd, qdd, twist, rate = _motion(tape, robot)
     bodies = Bodies.of(robot, T.R, q)
-    wrench = ground_wrench(bodies, qd, qdd, twist, rate, GRAVITY)
-    local = center_of_mass(robot, bodies.poses)
+    wrench = newton_euler.ground_wrench(bodies, qd, qdd, twist, rate, GRAVITY)
+    local = mass.center_of_mass(robot, bodies.poses)
     com = T.p + local
-    h = wrench_at(local, momentum(bodies, qd, twist))
+    h = wrench_at(local, newton_euler.momentum(bodies, qd, twist))
     rise = wrench.f * (1.0 / robot.mass)
     cart = cart_table_zmp(com, Vector(rise.x, rise.y, rise.z - GRAVITY), GRAVITY)
     about, zmp = wrench_at(-T.p, wrench), zmp_from_wrench(wrench, T.p)
-    recorder.output("com", com)
-    recorder.output("momentum", [*h.m, *h.f])
-    recorder.output("wrench", [*about.m, *about.f])
-    recorder.output("zmp", [zmp.x, zmp.y])
-    recorder.output("cart_table", [cart.x, cart.y])
-    return recorder.program()
+    tape.output("com", com)
+    tape.output("momentum", [*h.m, *h.f])
+    tape.output("wrench", [*about.m, *about.f])
+    tape.output("zmp", [zmp.x, zmp.y])
+    tape.output("cart_table", [cart.x, cart.y])

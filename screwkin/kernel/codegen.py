@@ -12,6 +12,7 @@ from screwkin.errors import InputError, UnknownNameError
 from screwkin.kernel import body, deflection, limbs
 from screwkin.kernel.emit_c import Real, argument, header, source
 from screwkin.kernel.margin import margin
+from screwkin.kernel.motion import follows, motion
 from screwkin.kernel.program import Group, Program
 from screwkin.kernel.records import identifier
 from screwkin.kernel.run import run
@@ -32,12 +33,12 @@ def _closed_limbs(robot: Robot) -> list[Program]:
 
 def _rates(accelerations: bool) -> Callable[[Robot], list[Program]]:
     def make(robot: Robot) -> list[Program]:
-        if not robot.limbs or not body.follows(robot, robot.joint_names):
+        if not robot.limbs or not follows(robot, robot.joint_names):
             raise InputError(
                 f"{robot.name}: rates follow limbs of six joints, or of three, that share none and have no "
                 "loops of their own; ask for tips, com or zmp"
             )
-        return [body.motion(robot, accelerations)]
+        return [motion.program(robot, accelerations)]
 
     return make
 
@@ -60,11 +61,11 @@ def _weighing(make: Callable[[Robot], Program]) -> Callable[[Robot], list[Progra
 
 
 KINDS: Mapping[str, Callable[[Robot], list[Program]]] = {
-    "tips": lambda robot: [body.tip_poses(robot)] if robot.limbs else [],
-    "com": _weighing(body.mass_center),
+    "tips": lambda robot: [body.tip_poses.program(robot)] if robot.limbs else [],
+    "com": _weighing(body.center_of_mass.program),
     "rates": _rates(False),
     "motion": _rates(True),
-    "zmp": _weighing(body.balance),
+    "zmp": _weighing(body.balance.program),
     "ik": _closed_limbs,
     "margin": lambda robot: [margin(robot)],
     "deflection": _deflections,

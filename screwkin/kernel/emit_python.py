@@ -45,7 +45,8 @@ def source(program: Program) -> str:
     at = 0
     for group in program.inputs:
         names = [f"v{at + k}" for k in range(group.size)]
-        lines.append(f"    ({', '.join(names)},) = {group.name}")
+        if names:
+            lines.append(f"    ({', '.join(names)},) = {group.name}")
         text.update({at + k: name for k, name in enumerate(names)})
         at += group.size
 

@@ -11,7 +11,7 @@ from functools import cache
 
 from screwkin import scalar
 from screwkin.errors import InputError
-from screwkin.kernel.body import best_link
+from screwkin.kernel.motion import best_link
 from screwkin.kernel.program import Program, Recorder
 from screwkin.kernel.records import identifier, pose_input
 from screwkin.model.robot import Robot

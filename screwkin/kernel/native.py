@@ -6,7 +6,6 @@ Nothing here is required: without a compiler, or where it fails, ``compiled`` gi
 from __future__ import annotations
 
 import ctypes
-import hashlib
 import os
 import platform
 import shutil
@@ -21,8 +20,8 @@ from typing import Any
 
 from screwkin.errors import OutputError
 from screwkin.files import atomic_path
-from screwkin.kernel import emit_c
-from screwkin.kernel.program import Program
+from screwkin.kernel import emit_c, series
+from screwkin.kernel.program import Program, digest
 
 Array = Any
 
@@ -39,9 +38,14 @@ THREADED_FROM = 8192
 
 def cache_folder() -> Path:
     """Where compiled kernels are kept: ``$SCREWKIN_CACHE``, else the user's cache folder."""
+    return _folder(os.environ.get("SCREWKIN_CACHE"))
+
+
+@cache
+def _folder(wanted: str | None) -> Path:
     import platformdirs
 
-    return Path(os.environ.get("SCREWKIN_CACHE") or platformdirs.user_cache_dir("screwkin", appauthor=False))
+    return Path(wanted or platformdirs.user_cache_dir("screwkin", appauthor=False))
 
 
 @cache
@@ -114,14 +118,14 @@ if hasattr(os, "register_at_fork"):
 
 
 def is_kept(program: Program) -> bool:
-    """True if the compiled program is loaded or lies in the cache: using it costs no compilation."""
+    """True if the compiled program lies in the cache: using it costs no compilation."""
     cc = compiler()
-    return cc is not None and _library(_source(program), cc, ()).exists()
+    return cc is not None and os.path.exists(_library(program.digest, cc, ()))
 
 
 def compiled(program: Program) -> Native | None:
     """The program as machine code, from the cache or compiled now; None if that is not possible here."""
-    function = shared(_source(program), program.name)
+    function = shared(program.digest, lambda: _source(program), program.name)
     if function is None:
         return None
     function.restype = None
@@ -129,25 +133,38 @@ def compiled(program: Program) -> Native | None:
     return Native(program, function)
 
 
-def shared(text: str, name: str, flags: tuple[str, ...] = ()) -> Any:
-    """A function of C source as a ctypes function, compiled now or before; None if that is not possible."""
+def shared(key: str, text: Callable[[], str], name: str, flags: tuple[str, ...] = ()) -> Any:
+    """A function of C source as a ctypes function, compiled now or before; None if that is not possible.
+
+    Args:
+        key: what decides the text, besides the emitter of C; the text itself is made only to compile it.
+        text: gives the source.
+        name: of the function.
+        flags: for the compiler, besides ``FLAGS``.
+    """
     cc = compiler()
     if cc is None:
         return None
-    library = _library(text, cc, flags)
+    library = _library(key, cc, flags)
     try:
-        if not library.exists():
-            _build(text, cc, flags, library)
-        return ctypes.CDLL(str(library))[name]
+        if not os.path.exists(library):
+            _build(text(), cc, flags, Path(library))
+        return ctypes.CDLL(library)[name]
     except (OSError, OutputError, AttributeError, subprocess.SubprocessError):
         return None
 
 
-@cache
 def _source(program: Program) -> str:
     """One file: the header's text in front of the definitions."""
     header = emit_c.header([program], "SCREWKIN_KERNEL_H", "double")
     return header + emit_c.source([program], None)
+
+
+@cache
+def emitter() -> str:
+    """What the text made of a program depends on besides the program."""
+    text = Path(emit_c.__file__).read_text(encoding="utf-8")
+    return digest(text, repr((series.SINE, series.COSINE, series.ARC, series.HALF_TURN, series.TURNS)))
 
 
 @cache
@@ -161,17 +178,17 @@ def _machine() -> str:
     return f"{platform.machine()} {platform.processor()} {flags}"
 
 
-def digest(*told: str) -> str:
-    """A name for what texts say."""
-    return hashlib.sha256("\n".join(told).encode()).hexdigest()[:32]
+def _library(key: str, cc: str, flags: tuple[str, ...]) -> str:
+    return f"{cache_folder()}/{_name(key, cc, flags)}.so"
 
 
-def _library(text: str, cc: str, flags: tuple[str, ...]) -> Path:
+@cache
+def _name(key: str, cc: str, flags: tuple[str, ...]) -> str:
     made_by = os.stat(cc)
-    name = digest(
-        text, cc, str(made_by.st_size), str(made_by.st_mtime_ns), _machine(), *FLAGS, *TUNED, *flags
+    return digest(
+        *(key, emitter(), cc, str(made_by.st_size), str(made_by.st_mtime_ns), _machine()),
+        *(*FLAGS, *TUNED, *flags),
     )
-    return cache_folder() / f"{name}.so"
 
 
 def _build(text: str, cc: str, flags: tuple[str, ...], library: Path) -> None:

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from screwkin.errors import ShapeError
 from screwkin.kernel import limbs
 from screwkin.kernel.records import identifier
-from screwkin.kernel.run import FROM, run
+from screwkin.kernel.run import run
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 from screwkin.solve.chain import Chain
@@ -32,7 +31,7 @@ def closed_targets(robot: Robot, targets: Mapping[str, Array]) -> tuple[tuple[st
 
 def solve_pose_fast(robot: Robot, targets: Mapping[str, Array], guess: State) -> PoseSolution:
     """As ``solve.pose.solve_pose``: the solution nearest to the guess, where there are closed forms."""
-    told = closed_targets(robot, targets) if _count(targets, guess) >= FROM else None
+    told = closed_targets(robot, targets)
     if told is None:
         return solve_pose(robot, targets, guess)
     base = np.asarray(targets.get("base", guess.T_world_base), dtype=float)
@@ -79,20 +78,6 @@ def _unwind(robot: Robot, tips: Sequence[str], found: dict[str, Array], guess: A
 
 def _inner(target: Array) -> int:
     return 2 if np.shape(target)[-2:] == (4, 4) else 1
-
-
-def _count(targets: Mapping[str, Array], guess: State) -> int:
-    """Samples of the batch.
-
-    Raises:
-        ShapeError: batches do not fit.
-    """
-    shapes = [np.shape(guess.T_world_base)[:-2], np.shape(guess.q)[:-1]]
-    shapes += [np.shape(x)[: np.ndim(x) - _inner(x)] for x in targets.values()]
-    try:
-        return int(np.prod(np.broadcast_shapes(*shapes)))
-    except ValueError:
-        raise ShapeError(f"batches of base, targets and guess do not broadcast: {shapes}") from None
 
 
 def _picked(array: Array, batch: tuple[int, ...], rows: Array, inner: int) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -21,13 +23,10 @@ class Group:
     name: str
     shape: tuple[int, ...]
 
-    @property
+    @cached_property
     def size(self) -> int:
         """How many scalars."""
-        size = 1
-        for n in self.shape:
-            size *= n
-        return size
+        return math.prod(self.shape)
 
 
 @dataclass(frozen=True)
@@ -68,21 +67,38 @@ class Program:
         """How often every operation stands."""
         return Counter(step.operation for step in self.steps)
 
+    @cached_property
+    def digest(self) -> str:
+        """A name for what the program is: equal for equal programs, in whatever process they were made."""
+        steps = ((step.operation, step.operands) for step in self.steps)
+        told = (self.name, self.about, self.inputs, self.outputs, tuple(steps), self.results)
+        return digest(repr(told))
+
     @property
     def operations(self) -> int:
         """Number of operations, sign changes apart (they are absorbed)."""
         return len(self.steps) - self.counts.get("neg", 0)
 
 
+def digest(*told: str) -> str:
+    """A name for what texts say."""
+    return hashlib.sha256("\n".join(told).encode()).hexdigest()[:32]
+
+
 class Recorder:
     """Makes a program: hands out inputs as graph scalars, and takes the outputs."""
 
-    def __init__(self, name: str, about: str) -> None:
-        self.name, self.about, self.graph = name, about, Graph()
+    def __init__(self, name: str = "", about: str = "") -> None:
+        self.graph = Graph()
+        self.title(name, about)
         self._inputs: list[Group] = []
         self._outputs: list[Group] = []
         self._places: list[int] = []
         self._results: list[Any] = []
+
+    def title(self, name: str, about: str) -> None:
+        """An identifier, and what is computed, a sentence."""
+        self.name, self.about = name, about
 
     def input(self, name: str, *shape: int) -> list[Any]:
         """The scalars of a new input array, flat in row-major order."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from screwkin.kernel.program import Recorder
+from screwkin.kernel.formula import Tape
 from screwkin.scalar import Scalar
 from screwkin.se3 import Pose, Rotation, Twist, Vector
 
@@ -13,15 +13,15 @@ def identifier(*parts: str) -> str:
     return text if text[:1].isalpha() else f"k_{text}"
 
 
-def pose_input(recorder: Recorder, name: str) -> Pose:
+def pose_input(tape: Tape, name: str) -> Pose:
     """An input (4, 4) as a pose; its last row is not read."""
-    T = recorder.input(name, 4, 4)
+    T = tape.input(name, 4, 4)
     return Pose(Rotation(*(Vector(T[c], T[4 + c], T[8 + c]) for c in range(3))), Vector(T[3], T[7], T[11]))
 
 
-def twist_input(recorder: Recorder, name: str) -> Twist:
+def twist_input(tape: Tape, name: str) -> Twist:
     """An input (6,) as a twist [omega; v]."""
-    x = recorder.input(name, 6)
+    x = tape.input(name, 6)
     return Twist(Vector(*x[:3]), Vector(*x[3:]))
 
 

@@ -7,22 +7,24 @@ generated Python for a few samples, machine code for more where a C compiler is 
 from __future__ import annotations
 
 import importlib.util
+import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from screwkin.files import atomic_path
 from screwkin.kernel import emit_python, native
-from screwkin.kernel.program import Program
+from screwkin.kernel.program import Group, Program, digest
 
 Array = Any
 Way = Literal["python", "numpy", "C"]
 
 FROM = 1000
-"""Samples from which callers make programs at all; for fewer, running the formulas themselves is quicker."""
-PYTHON_UP_TO = 16
+"""Samples from which long programs are made; an algorithm over arrays does as well for fewer."""
+PYTHON_UP_TO = 100
 """Samples up to which a loop of generated Python is faster than NumPy's calls."""
 COMPILE_FROM = 10_000
 """Samples from which a program that was never compiled here is compiled: some seconds, once and for all."""
@@ -47,22 +49,36 @@ def run(
     """
     arrays = [np.asarray(inputs[group.name], dtype=float) for group in program.inputs]
     if batch is None:
-        shapes = [a.shape[: a.ndim - len(g.shape)] for a, g in zip(arrays, program.inputs, strict=True)]
-        batch = np.broadcast_shapes(*shapes)
-    count = int(np.prod(batch))
-    flat = [
-        np.ascontiguousarray(np.broadcast_to(a, (*batch, *g.shape)).reshape(count, g.size))
-        for a, g in zip(arrays, program.inputs, strict=True)
-    ]
+        batch = common_batch(arrays, program.inputs)
+    count = math.prod(batch)
+    flat = [_flat(a, batch, count, g) for a, g in zip(arrays, program.inputs, strict=True)]
     filled = [np.empty((count, group.size)) for group in program.outputs]
     if count:
         _ways(program)[path or chosen_path(program, count)](flat, filled)
     return {g.name: a.reshape(*batch, *g.shape) for g, a in zip(program.outputs, filled, strict=True)}
 
 
+def common_batch(arrays: Sequence[Any], groups: Sequence[Group]) -> tuple[int, ...]:
+    """The shape to which what stands in front of the groups' shapes broadcasts.
+
+    Raises:
+        ValueError: there is none.
+    """
+    first, *others = [a.shape[: a.ndim - len(g.shape)] for a, g in zip(arrays, groups, strict=True)]
+    return first if all(shape == first for shape in others) else np.broadcast_shapes(first, *others)
+
+
+def _flat(array: Array, batch: tuple[int, ...], count: int, group: Group) -> Array:
+    """An input as C-contiguous rows (count, size)."""
+    shape = (*batch, *group.shape)
+    whole = array if array.shape == shape else np.broadcast_to(array, shape)
+    rows = whole.reshape(count, group.size)
+    return rows if rows.flags.c_contiguous else np.ascontiguousarray(rows)
+
+
 def chosen_path(program: Program, count: int) -> Way:
     """The path that ``run`` takes for so many samples."""
-    if native.compiler() and (count >= COMPILE_FROM or native.is_kept(program)) and machine_code(program):
+    if (count >= COMPILE_FROM or _is_kept(program)) and machine_code(program):
         return "C"
     return "python" if count <= PYTHON_UP_TO else "numpy"
 
@@ -75,7 +91,15 @@ def large_batches() -> Way:
 @cache
 def machine_code(program: Program) -> native.Native | None:
     """The compiled program, None where that is not possible."""
-    return native.compiled(program)
+    made = native.compiled(program)
+    _is_kept.cache_clear()
+    return made
+
+
+@cache
+def _is_kept(program: Program) -> bool:
+    """As ``native.is_kept``, asked once: the file system's answer takes longer than a sample."""
+    return native.is_kept(program)
 
 
 @cache
@@ -109,9 +133,10 @@ def python_function(program: Program) -> Callable[..., Sequence[list[float]]]:
 
     The module is written to the cache folder and imported from there.
     """
-    text = emit_python.source(program)
-    file = native.cache_folder() / f"{program.name}_{native.digest(text)[:16]}.py"
+    made_by = Path(emit_python.__file__).read_text(encoding="utf-8")
+    file = native.cache_folder() / f"{program.name}_{digest(program.digest, made_by)[:16]}.py"
     if not file.exists():
+        text = emit_python.source(program)
         file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         with atomic_path(file) as beside:
             beside.write_text(text, encoding="utf-8")

@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from screwkin import scalar
-from screwkin.kernel.blocks import mechanism_of, small
+from screwkin.kernel.blocks import small
+from screwkin.kernel.davies import mechanism_of
 from screwkin.kernel.program import Program, Recorder
 from screwkin.kernel.records import identifier, pose_input
 from screwkin.kernel.run import run

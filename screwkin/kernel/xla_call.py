@@ -20,7 +20,7 @@ import numpy as np
 from jax import lax
 
 from screwkin.kernel import emit_c, emit_jax, native
-from screwkin.kernel.program import Group, Program
+from screwkin.kernel.program import Group, Program, digest
 
 Array = Any
 
@@ -91,10 +91,11 @@ def _target(program: Program) -> str | None:
     if not all(group.size for group in (*program.inputs, *program.outputs)):
         return None
     flags = (f"-I{jax.ffi.include_dir()}", "-D_DEFAULT_SOURCE")
-    handler = native.shared(source(program), f"{program.name}_xla", flags)
+    key = digest(program.digest, version("jaxlib"), _HANDLER, _definitions(program))
+    handler = native.shared(key, lambda: source(program), f"{program.name}_xla", flags)
     if handler is None:
         return None
-    name = f"screwkin.{program.name}.{native.digest(source(program))[:16]}"
+    name = f"screwkin.{program.name}.{key[:16]}"
     jax.ffi.register_ffi_target(name, jax.ffi.pycapsule(handler), platform="cpu")
     return name
 

@@ -62,10 +62,14 @@ def network_matrix(
 
     ``circuits`` (k, couplings) is another choice of circuits than the mechanism's own.
     """
-    S = as_array(list(twists), batch)
+    return assembled(mechanism, as_array(list(twists), batch).swapaxes(-1, -2), circuits)
+
+
+def assembled(mechanism: Mechanism, S: Any, circuits: Integers | None = None) -> Any:
+    """The same from the couplings' screws as columns S (..., 6, couplings)."""
     B = (mechanism.circuit_matrix if circuits is None else circuits).astype(float)
     signs = B.reshape(*(1 for _ in S.shape[:-2]), len(B), 1, B.shape[1])
-    N = signs * S.swapaxes(-1, -2)[..., None, :, :]
+    N = signs * S[..., None, :, :]
     return N.reshape(*S.shape[:-2], 6 * len(B), len(mechanism.couplings))
 
 

@@ -26,7 +26,7 @@ from benchmarks.devices import measured
 from screwkin.kernel import body
 q = np.random.default_rng(0).uniform(-2, 2, (64, 12))
 given = {"T_world_base": np.tile(np.eye(4), (64, 1, 1)), "q": q}
-program = body.tip_poses(sk.load_robot("poppy12"))
+program = body.tip_poses.program(sk.load_robot("poppy12"))
 rows = [measured(program, given, dtype, jax.devices(), 2) for dtype in ("float64", "float32")]
 print(json.dumps([asdict(row) for row in rows]))
 """
@@ -53,7 +53,7 @@ def test_batches_are_shared_among_devices() -> None:
 def test_wrong_results_are_not_timed(monkeypatch: pytest.MonkeyPatch) -> None:
     import jax
 
-    program = body.tip_poses(sk.load_robot("poppy12"))
+    program = body.tip_poses.program(sk.load_robot("poppy12"))
     given = {"T_world_base": np.tile(np.eye(4), (8, 1, 1)), "q": np.zeros((8, 12))}
     honest = devices.run
     monkeypatch.setattr(

@@ -21,7 +21,7 @@ def last(array):
 
 def test_a_kernel_gives_the_same_numbers_in_jax_and_is_traced_once():
     robot = sk.load_robot("poppy12")
-    program = body.tip_poses(robot)
+    program = body.tip_poses.program(robot)
     traces = []
     kernel = emit_jax.function(program)
 
@@ -41,7 +41,7 @@ def test_a_kernel_gives_the_same_numbers_in_jax_and_is_traced_once():
 
 def test_gradients_are_those_of_finite_differences():
     robot = sk.load_robot("poppy12")
-    kernel = emit_jax.function(body.mass_center(robot))
+    kernel = emit_jax.function(body.center_of_mass.program(robot))
     q, T = jnp.asarray(np.random.default_rng(1).uniform(-1, 1, (12, 3))), jnp.tile(jnp.eye(4)[..., None], 3)
 
     def height(q):
@@ -55,7 +55,7 @@ def test_gradients_are_those_of_finite_differences():
 
 
 def test_a_sample_without_numbers_leaves_the_others_as_they_are_and_none_is_no_fault():
-    program = body.mass_center(sk.load_robot("poppy12"))
+    program = body.center_of_mass.program(sk.load_robot("poppy12"))
     kernel = jax.jit(emit_jax.function(program))
     T, q = jnp.tile(jnp.eye(4)[..., None], 3), jnp.asarray(np.random.default_rng(1).uniform(-1, 1, (12, 3)))
     (sound,) = kernel(T, q)

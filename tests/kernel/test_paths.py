@@ -10,6 +10,7 @@ from screwkin.dynamics.newton_euler import GRAVITY
 from screwkin.kernel import body, limbs, native
 from screwkin.kernel.emit_python import source
 from screwkin.kernel.graph import FUNCTIONS
+from screwkin.kernel.motion import follows, motion
 from screwkin.kernel.program import Recorder
 from screwkin.kernel.run import chosen_path, python_function, run
 from screwkin.kernel.series import TURNS
@@ -36,7 +37,7 @@ def test_rates_and_tips_are_those_of_davies_method(name, path):
     upright = sk.State(
         sk.home(robot).T_world_base, state.q
     )  # Euler rates of the waist are singular at 90 deg
-    program, mechanism = body.motion(robot), sk.closed_mechanism(robot)
+    program, mechanism = motion.program(robot), sk.closed_mechanism(robot)
     inputs = {g.name: rng.uniform(-1, 1, (len(state.q), *g.shape)) for g in program.inputs}
     inputs |= {"T_world_base": upright.T_world_base, "q": upright.q}
     found = run(program, inputs, path=path)
@@ -54,7 +55,7 @@ def test_rates_and_tips_are_those_of_davies_method(name, path):
 def test_accelerations_are_the_slopes_of_the_rates(name):
     """Base and tips move with constant rates of change; the kernel's accelerations against differences."""
     robot = sk.load_robot(name)
-    program, rates = body.motion(robot, True), body.motion(robot)
+    program, rates = motion.program(robot, True), motion.program(robot)
     state, rng = moving(robot, 8)
     inputs = {g.name: rng.uniform(-0.05, 0.05, (8, *g.shape)) for g in program.inputs}
     inputs |= {"T_world_base": state.T_world_base, "q": state.q}
@@ -85,7 +86,7 @@ def test_accelerations_are_the_slopes_of_the_rates(name):
 def test_centre_of_mass_momentum_and_zmp_are_those_of_the_formulas(path):
     robot = sk.load_robot("poppy12")
     state, rng = moving(robot)
-    program = body.balance(robot)
+    program = body.balance.program(robot)
     inputs = {g.name: rng.uniform(-1, 1, (len(state.q), *g.shape)) for g in program.inputs}
     inputs |= {"T_world_base": state.T_world_base, "q": state.q}
     found = run(program, inputs, path=path)
@@ -110,11 +111,12 @@ def test_random_trees_of_turning_sliding_and_helical_joints(seed, path):
     robot = random_tree(seed)
     state = random_state(robot, seed, (20,))
     for program, expected in (
-        (body.link_poses(robot), sk.link_poses(robot, state)),
-        (body.mass_center(robot), sk.center_of_mass(robot, state)),
+        (body.link_poses.program(robot), body.link_poses.values(robot, told=vars(state))),
+        (body.center_of_mass.program(robot), body.center_of_mass.values(robot, told=vars(state))),
     ):
         found = run(program, vars(state), path=path)
-        np.testing.assert_allclose(found[program.outputs[0].name], expected, atol=1e-13)
+        for name, values in expected.items():
+            np.testing.assert_allclose(found[name], values, atol=1e-13)
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -123,7 +125,7 @@ def test_compact_jacobians_are_columns_of_the_public_one(name):
     q = moving(robot)[0].q
     state = sk.State(np.eye(4), q)
     for limb in robot.limbs:
-        found = run(body.limb_jacobian(robot, limb.name), {"q": q}, path="numpy")["J"]
+        found = run(body.limb_jacobian.program(robot, limb.name), {"q": q}, path="numpy")["J"]
         columns = [6 + i for i in robot.path_to(limb.link)]
         np.testing.assert_allclose(found, sk.jacobian(robot, state, limb.tip)[..., columns], atol=1e-14)
 
@@ -149,15 +151,15 @@ def test_inputs_broadcast_and_an_empty_batch_is_no_fault():
     robot = sk.load_robot("poppy12")
     q = np.zeros((3, 1, 12))
     T = np.broadcast_to(np.eye(4), (5, 4, 4))
-    found = run(body.tip_poses(robot), {"T_world_base": T, "q": q})["T_world_tip"]
+    found = run(body.tip_poses.program(robot), {"T_world_base": T, "q": q})["T_world_tip"]
     assert found.shape == (3, 5, 2, 4, 4)
-    none = run(body.tip_poses(robot), {"T_world_base": np.eye(4), "q": np.zeros((0, 12))})
+    none = run(body.tip_poses.program(robot), {"T_world_base": np.eye(4), "q": np.zeros((0, 12))})
     assert none["T_world_tip"].shape == (0, 2, 4, 4)
 
 
 def test_generated_python_is_a_module_that_stands_alone():
     robot = sk.load_robot("poppy12")
-    program = body.tip_poses(robot)
+    program = body.tip_poses.program(robot)
     home = sk.home(robot)
     told = python_function(program)(home.T_world_base.ravel().tolist(), home.q.tolist())
     expected = sk.frame_pose(robot, home, "left_foot")
@@ -210,7 +212,7 @@ def test_what_has_no_value_is_infinite_or_no_number_on_every_path(path):
 
 def test_without_a_compiler_samples_are_computed_by_python_and_numpy(monkeypatch):
     monkeypatch.setattr(native, "compiler", lambda: None)
-    program = body.mass_center(random_tree(99))
+    program = body.center_of_mass.program(random_tree(99))
     assert chosen_path(program, 1) == "python"
     assert chosen_path(program, 10**6) == "numpy"
     assert native.compiled(program) is None
@@ -219,20 +221,20 @@ def test_without_a_compiler_samples_are_computed_by_python_and_numpy(monkeypatch
 @pytest.mark.skipif(not native.compiler(), reason="no C compiler")
 def test_a_compiled_program_is_kept_and_a_failing_compiler_is_no_fault(monkeypatch, tmp_path):
     monkeypatch.setenv("SCREWKIN_CACHE", str(tmp_path / "kept"))
-    program = body.mass_center(random_tree(98))
+    program = body.center_of_mass.program(random_tree(98))
     assert not native.is_kept(program)
     assert native.compiled(program) is not None
     assert native.is_kept(program)
     assert [p.suffix for p in (tmp_path / "kept").iterdir()] == [".so"], "nothing half-written is left"
     monkeypatch.setattr(native, "compiler", lambda: "/bin/false")
-    assert native.compiled(body.mass_center(random_tree(97))) is None
+    assert native.compiled(body.center_of_mass.program(random_tree(97))) is None
 
 
 def test_six_and_three_joint_limbs_alone_are_followed():
     bioloid = sk.load_robot("bioloid")
     mechanism = sk.closed_mechanism(bioloid)
-    assert body.follows(bioloid, mechanism.secondary)
-    assert not body.follows(bioloid, mechanism.secondary[1:])
-    assert not body.follows(random_tree(1), random_tree(1).joint_names)
+    assert follows(bioloid, mechanism.secondary)
+    assert not follows(bioloid, mechanism.secondary[1:])
+    assert not follows(random_tree(1), random_tree(1).joint_names)
     assert limbs.solvable(bioloid, "left_hand", False)
     assert not limbs.solvable(bioloid, "left_hand", True)

@@ -18,7 +18,7 @@ compiled = pytest.mark.skipif(native.compiler() is None, reason="no C compiler h
 
 @pytest.fixture(scope="module")
 def program():
-    return body.mass_center(sk.load_robot("poppy12"))
+    return body.center_of_mass.program(sk.load_robot("poppy12"))
 
 
 def inputs_of(count, seed=0):
