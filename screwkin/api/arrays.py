@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from screwkin.errors import ShapeError
-from screwkin.kernel.rigid import deviation
+from screwkin.kernel.rigid import foreign
 from screwkin.model.robot import Robot
-from screwkin.model.state import RIGID, State
+from screwkin.model.state import State
 from screwkin.scalar import is_jax
 
 Array = Any
@@ -48,7 +48,7 @@ def rigid(name: str, T: Array) -> Array:
     """
     if is_jax(T):
         return T
-    bad = deviation(T) > RIGID
+    bad = foreign(T)
     if bad.any():
         sample = tuple(int(i) for i in np.argwhere(bad)[0])
         raise ShapeError(

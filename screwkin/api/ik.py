@@ -11,6 +11,7 @@ from screwkin.errors import InputError, ShapeError
 from screwkin.kernel.branches import limb_solutions
 from screwkin.kernel.limbs import solvable
 from screwkin.kernel.rigid import nearest_poses
+from screwkin.kernel.run import pays
 from screwkin.model.robot import Robot
 from screwkin.model.state import RIGID
 from screwkin.solve.branches import LimbSolutions
@@ -74,7 +75,8 @@ def limb_ik(
     shape = target.shape[target.ndim - around :]
     flat = np.broadcast_to(target, (*batch, *shape)).reshape(count, *shape)
     flat_start = np.broadcast_to(start, (*batch, start.shape[-1])).reshape(count, start.shape[-1])
-    if poses and (method == "closed" or (method == "auto" and solvable(robot, limb, True))):
+    closed = poses and (method == "closed" or (method == "auto" and solvable(robot, limb, True)))
+    if closed and pays("limb_ik", robot, chain.limb, count=count):
         return limb_solutions(robot, chain.limb, flat, flat_start, batch, least_squares)
     return solve_limb(chain, flat, method, flat_start, settings or IkSettings(), batch, least_squares)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any, Literal
 
@@ -13,6 +14,7 @@ from screwkin.errors import InputError, UnknownNameError
 from screwkin.kernel import davies
 from screwkin.kernel.pose import solve_pose_fast
 from screwkin.kernel.records import identifier
+from screwkin.kernel.run import pays
 from screwkin.kernel.secondary import secondary_rates as kernel_rates
 from screwkin.mechanism import network
 from screwkin.mechanism import virtual_motion as virtual
@@ -119,7 +121,7 @@ def secondary_rates(
 
 
 def _by_program(mechanism: Mechanism, state: State, primary: Array) -> Array | None:
-    """Secondary rates of samples none of which is singular by the kernel; None where that is not so."""
+    """Secondary rates by the kernel; None where a sample is singular, or no program is worth making."""
     if is_jax(primary):
         return None
     arrays = told(mechanism.robot, state)
@@ -128,6 +130,9 @@ def _by_program(mechanism: Mechanism, state: State, primary: Array) -> Array | N
     arrays["primary_rates"] = primary
     inner = {"T_world_base": 2}
     batch = one_batch(inner, arrays)
+    choice = mechanism.primary, mechanism.secondary
+    if not pays("secondary_rates", mechanism.robot, *choice, count=math.prod(batch)):
+        return None
     flat = []
     for name, a in arrays.items():
         shape = a.shape[a.ndim - inner.get(name, 1) :]
@@ -159,8 +164,8 @@ def solve_pose(
         targets: ``"base"`` (..., 4, 4) and tips by name: a pose (..., 4, 4), or a position (..., 3) with the
             orientation free; world frame.
         guess: a nearby state; default ``home``. Its base pose holds where ``"base"`` is not given.
-        method: ``"newton"``, through the network matrix; ``"auto"``: for large batches the closed forms of
-            the limbs, where they have some, of the solution nearest to the guess.
+        method: ``"newton"``, through the network matrix; ``"auto"``: for large batches, or when asked again
+            and again, the closed forms of the limbs where they have some: the solution nearest to the guess.
 
     Returns:
         PoseSolution with ``.state .status .residual .iterations`` (..., limbs). Nothing is raised for samples
@@ -184,6 +189,7 @@ def solve_pose(
     base = base if "base" in wanted else rigid("guess.T_world_base", base)
     q = checked("guess.q", guess.q, len(robot.joints))
     arrays = wanted | {"guess.T_world_base": base, "guess.q": q}
-    one_batch({name: 2 for name, a in arrays.items() if np.shape(a)[-2:] == (4, 4)}, arrays)
+    batch = one_batch({name: 2 for name, a in arrays.items() if np.shape(a)[-2:] == (4, 4)}, arrays)
     start = State(np.asarray(base, dtype=float), np.asarray(q, dtype=float))
-    return (solve_pose_fast if method == "auto" else newton_pose)(robot, wanted, start)
+    auto = method == "auto" and pays("solve_pose", robot, *wanted, count=math.prod(batch))
+    return (solve_pose_fast if auto else newton_pose)(robot, wanted, start)

@@ -12,6 +12,7 @@ from screwkin.dynamics.support import Spike, sole_corners, spikes
 from screwkin.errors import InputError
 from screwkin.kernel.body import balance
 from screwkin.kernel.margin import support_margin_fast
+from screwkin.kernel.run import FROM, run
 from screwkin.model.robot import Robot
 from screwkin.trajectory import Trajectory
 
@@ -71,7 +72,8 @@ def ground_reaction(
         acceleration: its time derivative (T, 6).
     """
     told = {"T_world_base": T_world_base, "q": q, "qd": qd, "qdd": qdd}
-    found = balance(robot, told=told | {"base_twist": twist, "base_acceleration": acceleration})
+    told |= {"base_twist": twist, "base_acceleration": acceleration}
+    found = run(balance.program(robot), told) if len(q) >= FROM else balance.values(robot, told=told)
     return found["zmp"], found["com"], found["wrench"], found["cart_table"]
 
 

@@ -14,8 +14,9 @@ from screwkin.gait.plan import Plan
 from screwkin.gait.stance import LEFT, RIGHT, Foot, Hand, Stance
 from screwkin.kernel.blocks import least_values
 from screwkin.kernel.motion import follows, motion
-from screwkin.kernel.pose import solve_pose_fast
+from screwkin.kernel.pose import solve_samples
 from screwkin.kernel.records import identifier
+from screwkin.kernel.run import FROM, run
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.mechanism.mechanism import Mechanism
 from screwkin.mechanism.network import blend, coupling_twists, network_matrix
@@ -99,7 +100,7 @@ def positions(robot: Robot, mechanism: Mechanism, made: Plan, guess: Array | Non
     """
     start = np.array(robot.posture("home").q) if guess is None else guess
     targets = {"base": made.T_world_base, **_targets(robot, mechanism, made)}
-    solution = solve_pose_fast(robot, targets, State(made.T_world_base, start))
+    solution = solve_samples(robot, targets, State(made.T_world_base, start))
     solution.raise_on_failure(robot, made.time)
     return solution
 
@@ -128,7 +129,7 @@ def _turns(mechanism: Mechanism, tip: str) -> bool:
 def differentiate(mechanism: Mechanism, made: Plan, state: State) -> Motion:
     """Rates and accelerations of the joints from those of the plan, through N and its derivative."""
     q, T = unstack(state.q), pose_from_array(made.T_world_base)
-    if follows(robot := mechanism.robot, mechanism.secondary):
+    if len(made.time) >= FROM and follows(robot := mechanism.robot, mechanism.secondary):
         qd, qdd = _compiled_motion(robot, made, state.q)
         sigma = least_values(mechanism, made.T_world_base, state.q)
         found = SecondarySolution(qd, sigma, block_names(mechanism))
@@ -172,5 +173,5 @@ def _compiled_motion(robot: Robot, made: Plan, q: Array) -> tuple[Array, Array]:
             told = as_array(imposed[limb.tip], count)
             whole = len(robot.path_to(limb.link)) == 6
             inputs[identifier(what, limb.tip)] = told if whole else told[:, 3:]
-    found = motion(robot, True, told=inputs)
+    found = run(motion.program(robot, True), inputs)
     return found["qd"], found["qdd"]

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any
 
 import numpy as np
 
 from screwkin.kernel.davies import mechanism_of
-from screwkin.kernel.program import Program, Recorder
+from screwkin.kernel.program import Program, Recorder, kept
 from screwkin.kernel.records import identifier, pose_input
 from screwkin.kernel.run import run
 from screwkin.mechanism.choice import characteristic_length
@@ -53,7 +52,7 @@ def _by_lapack(mechanism: Mechanism, T_world_base: Array, q: Array) -> Array:
     return singular_values(mechanism, network_matrix(mechanism, twists, (len(q),)))
 
 
-@cache
+@kept
 def block_values(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, ...]) -> Program:
     """Least singular value of every block of a mechanism, and whether it is sure.
 

@@ -5,9 +5,8 @@ A mechanism is told by its robot and its choice of couplings, which are equal wh
 
 from __future__ import annotations
 
-from functools import cache
-
 from screwkin.kernel.formula import Formula, Tape
+from screwkin.kernel.program import kept
 from screwkin.kernel.records import identifier, pose_input
 from screwkin.mechanism.mechanism import Mechanism, coupling_graph, virtual_chains
 from screwkin.mechanism.network import coupling_twists
@@ -18,7 +17,7 @@ from screwkin.se3 import ZERO, Twist, Vector
 Names = tuple[str, ...]
 
 
-@cache
+@kept
 def mechanism_of(robot: Robot, primary: Names, secondary: Names) -> Mechanism:
     """The mechanism of a robot with a choice that has been checked."""
     chains = virtual_chains(robot)

@@ -8,10 +8,9 @@ pivots tell whether the robot stands (Sylvester's law of inertia; Golub and Van 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
 
 from screwkin.dynamics.supported import Supported
-from screwkin.kernel.program import Program, Recorder
+from screwkin.kernel.program import Program, Recorder, kept
 from screwkin.kernel.records import identifier, matrix, pose_input
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.model.robot import Robot
@@ -24,7 +23,7 @@ SURE = 1e-6
 ABOUT = "stable: 1 if springs and weight resist every further deflection; sure: 1 if that is beyond rounding"
 
 
-@cache
+@kept
 def linear(robot: Robot, support: str) -> Program:
     """Deflection to first order, by the torques of the posture that is commanded.
 
@@ -59,7 +58,7 @@ def linear(robot: Robot, support: str) -> Program:
     return recorder.program()
 
 
-@cache
+@kept
 def settling(robot: Robot, support: str) -> Program:
     """A step of Newton's method towards the equilibrium of springs and weight.
 
@@ -86,7 +85,7 @@ def settling(robot: Robot, support: str) -> Program:
     return recorder.program()
 
 
-@cache
+@kept
 def moved(robot: Robot, support: str) -> Program:
     """Where base and tips are after a deflection, and by how much they have moved.
 

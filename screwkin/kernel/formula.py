@@ -7,11 +7,11 @@ hands out graph scalars and keeps what is done with them; ``Values`` hands out a
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from functools import cache
 from typing import Any, Protocol
 
-from screwkin.kernel.program import Group, Program, Recorder
-from screwkin.kernel.run import common_batch, run
+from screwkin.kernel.program import Group, Program, Recorder, kept
+from screwkin.kernel.run import common_batch, pays, run
+from screwkin.model.robot import Robot
 from screwkin.scalar import Scalar, is_jax
 from screwkin.se3 import as_array, leaves, unstack
 
@@ -64,25 +64,36 @@ class Values:
 
 
 class Formula:
-    """A map without iteration of what is told on a tape, for some robot and some choices."""
+    """A map without iteration of what is told on a tape, for a robot and some choices."""
 
     def __init__(self, tell: Callable[..., None]) -> None:
         self.__doc__, self._tell = tell.__doc__, tell
-        self.program = cache(self._recorded)
+        self.program = kept(self._recorded)
 
-    def _recorded(self, *about: Hashable) -> Program:
+    def _recorded(self, robot: Robot, *about: Hashable) -> Program:
         recorder = Recorder()
-        self._tell(recorder, *about)
+        self._tell(recorder, robot, *about)
         return recorder.program()
 
-    def values(self, *about: Hashable, told: Mapping[str, Array]) -> dict[str, Array]:
+    def values(self, robot: Robot, *about: Hashable, told: Mapping[str, Array]) -> dict[str, Array]:
         """Every output, by the formula itself over arrays."""
         tape = Values(told)
-        self._tell(tape, *about)
+        self._tell(tape, robot, *about)
         return tape.arrays()
 
-    def __call__(self, *about: Hashable, told: Mapping[str, Array]) -> dict[str, Array]:
-        """Every output by name, (*batch, *shape): by the program, or by the formula where JAX is told."""
+    def __call__(self, robot: Robot, *about: Hashable, told: Mapping[str, Array]) -> dict[str, Array]:
+        """Every output by name, (*batch, *shape).
+
+        By the formula where JAX is told, or where little is asked (``run.pays``); else by the program.
+        """
         if any(is_jax(array) for array in told.values()):
-            return self.values(*about, told=told)
-        return run(self.program(*about), told)
+            return self.values(robot, *about, told=told)
+        count = max(array.size // _row(name, array) for name, array in told.items())
+        if pays(self, robot, *about, count=count):
+            return run(self.program(robot, *about), told)
+        return self.values(robot, *about, told=told)
+
+
+def _row(name: str, array: Array) -> int:
+    """Numbers of one sample."""
+    return 16 if name == "T_world_base" else max(array.shape[-1], 1)

@@ -7,12 +7,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import cache
 
 from screwkin import scalar
 from screwkin.errors import InputError
 from screwkin.kernel.motion import best_link
-from screwkin.kernel.program import Program, Recorder
+from screwkin.kernel.program import Program, Recorder, kept
 from screwkin.kernel.records import identifier, pose_input
 from screwkin.model.robot import Robot
 from screwkin.scalar import Scalar, where
@@ -37,7 +36,7 @@ FOUND = (
 )
 
 
-@cache
+@kept
 def limb_branches(robot: Robot, limb: str) -> Program:
     """All solutions of a limb's closed form, in the order of ``solve.branches.ordered``."""
     chain = Chain.of(robot, limb)
@@ -95,7 +94,7 @@ def excess(chain: Chain, q: Sequence[Scalar]) -> tuple[Scalar, Scalar]:
     return worst, index
 
 
-@cache
+@kept
 def limb_nearest(robot: Robot, limb: str) -> Program:
     """The solution of a limb's closed form that is nearest to a guess."""
     chain = Chain.of(robot, limb)
@@ -112,7 +111,7 @@ def limb_nearest(robot: Robot, limb: str) -> Program:
     return recorder.program()
 
 
-@cache
+@kept
 def solvable(robot: Robot, tip: str, pose: bool) -> bool:
     """True if a limb's pose (or its tip's position) has a closed form."""
     chain = Chain.of(robot, tip)
@@ -125,7 +124,7 @@ def solvable(robot: Robot, tip: str, pose: bool) -> bool:
     return True
 
 
-@cache
+@kept
 def whole_body(robot: Robot, targets: tuple[tuple[str, bool], ...]) -> Program:
     """Joint positions that put several tips where they are wanted, each limb by its closed form.
 

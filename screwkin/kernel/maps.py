@@ -9,11 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 
 from screwkin import scalar
 from screwkin.kernel.limbs import cosines, wrapped
-from screwkin.kernel.program import Program, Recorder
+from screwkin.kernel.program import Program, Recorder, kept
 from screwkin.kernel.records import identifier
 from screwkin.model.robot import Robot
 from screwkin.scalar import Scalar, where
@@ -62,7 +61,7 @@ class _Branch:
     clear: Scalar
 
 
-@cache
+@kept
 def limb_map(robot: Robot, limb: str, guess: tuple[float, ...], length: float) -> Program:
     """What decides whether a limb reaches a point, and how well it is conditioned there.
 

@@ -10,14 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import cache
 from typing import Any
 
 import numpy as np
 
 from screwkin.dynamics.support import polygon_starts, sole_corners, support_margin
 from screwkin.errors import InputError
-from screwkin.kernel.program import Program, Recorder
+from screwkin.kernel.program import Program, Recorder, kept
 from screwkin.kernel.records import identifier, pose_input
 from screwkin.kernel.run import FROM, run
 from screwkin.model.robot import Robot
@@ -56,7 +55,7 @@ def support_margin_fast(zmp: Array, soles: Array, contact: Array) -> Array:
     return margin
 
 
-@cache
+@kept
 def support(feet: int, corners: int) -> Program:
     """Signed distance of a point to the border of the convex hull of the soles that bear, -inf if none does.
 
@@ -73,7 +72,7 @@ def support(feet: int, corners: int) -> Program:
     return recorder.program()
 
 
-@cache
+@kept
 def margin(robot: Robot) -> Program:
     """The same for a robot, from the poses of its feet.
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
 
 from screwkin.kernel.formula import Formula, Tape
-from screwkin.kernel.program import Recorder
+from screwkin.kernel.program import Recorder, kept
 from screwkin.kernel.records import identifier, matrix, pose_input, twist_input
 from screwkin.kinematics import positions
 from screwkin.model.robot import Robot
@@ -76,7 +75,7 @@ def motion(tape: Tape, robot: Robot, accelerations: bool = False) -> None:
     tape.output("determinant", [determinant for _, determinant in solved])
 
 
-@cache
+@kept
 def best_link(robot: Robot, limb: str) -> int:
     """After how many joints of a limb the link stands in whose axes its rates take least.
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from screwkin.kernel import limbs
 from screwkin.kernel.records import identifier
-from screwkin.kernel.run import run
+from screwkin.kernel.run import FROM, run
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 from screwkin.solve.chain import Chain
@@ -57,6 +57,15 @@ def solve_pose_fast(robot: Robot, targets: Mapping[str, Array], guess: State) ->
     picked = {name: _picked(x, batch, again, _inner(x)) for name, x in targets.items()}
     rest = State(_picked(guess.T_world_base, batch, again, 2), _picked(guess.q, batch, again, 1))
     return solution.replaced(again, solve_pose(robot, picked, rest))
+
+
+def solve_samples(robot: Robot, targets: Mapping[str, Array], guess: State) -> PoseSolution:
+    """The same for the samples (T,) of a motion: by closed forms if there are many, else by Newton's method.
+
+    How many samples there are decides alone, so that a motion is the same whenever it is made.
+    """
+    many = len(guess.T_world_base) >= FROM
+    return (solve_pose_fast if many else solve_pose)(robot, targets, guess)
 
 
 def _unwind(robot: Robot, tips: Sequence[str], found: dict[str, Array], guess: Array) -> None:

@@ -5,15 +5,23 @@ from __future__ import annotations
 import hashlib
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from functools import cached_property, lru_cache
+from typing import Any, TypeVar
 
 from screwkin.kernel.graph import Graph, Node
 from screwkin.se3 import leaves
 
 Operand = int | float
+T = TypeVar("T")
+KEPT = 256
+"""How many results ``kept`` keeps."""
+
+
+def kept(make: Callable[..., T]) -> Callable[..., T]:
+    """Keep what is made of a robot or a program, but not for all that a search over robots goes through."""
+    return lru_cache(maxsize=KEPT)(make)
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from functools import cache
 from typing import Any
 
-from screwkin.kernel.program import Program, Recorder
+from screwkin.kernel.program import Program, Recorder, kept
 from screwkin.kernel.records import matrix
-from screwkin.kernel.run import run
+from screwkin.kernel.run import chosen_path, run
+from screwkin.model.state import RIGID, not_rigid
 from screwkin.scalar import Scalar, where
 from screwkin.se3 import Pose, Rotation, Vector, cross, dot
 from screwkin.solve.quartic import abs_
@@ -16,18 +16,28 @@ from screwkin.solve.quartic import abs_
 Array = Any
 
 
-def deviation(T: Array) -> Array:
-    """How far matrices (..., 4, 4) are from rigid displacements (...,): see ``poses``."""
-    return run(poses(False), {"T": T})["deviation"][..., 0]
+FEW = 8
+"""Matrices up to which generated Python is quicker than NumPy's linear algebra."""
+
+
+def foreign(T: Array) -> Array:
+    """Which of the matrices (..., 4, 4) are no rigid displacements (...,)."""
+    count = T.size // 16
+    if count > FEW and chosen_path(poses(False), count) != "C":
+        return not_rigid(T)
+    return run(poses(False), {"T": T})["deviation"][..., 0] > RIGID
 
 
 def nearest_poses(T: Array) -> tuple[Array, Array]:
-    """The same, and the poses (..., 4, 4) with their rotations exact to the last digit."""
+    """How far matrices (..., 4, 4) are from poses (...,), and poses with exact rotations.
+
+    The distance is that of ``poses``; rotations are exact to the last digit.
+    """
     found = run(poses(True), {"T": T})
     return found["deviation"][..., 0], found["pose"]
 
 
-@cache
+@kept
 def poses(exact: bool) -> Program:
     """Largest entry of R^T R - 1 and of the last row's difference from 0 0 0 1; infinite if left-handed.
 

@@ -6,24 +6,26 @@ generated Python for a few samples, machine code for more where a C compiler is 
 
 from __future__ import annotations
 
-import importlib.util
 import math
-from collections.abc import Callable, Mapping, Sequence
-from functools import cache
-from pathlib import Path
+from collections import Counter
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from functools import lru_cache
 from typing import Any, Literal
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from screwkin.files import atomic_path
 from screwkin.kernel import emit_python, native
-from screwkin.kernel.program import Group, Program, digest
+from screwkin.kernel.program import KEPT, Group, Program, kept
+from screwkin.model.robot import Robot
 
 Array = Any
 Way = Literal["python", "numpy", "C"]
 
 FROM = 1000
-"""Samples from which long programs are made; an algorithm over arrays does as well for fewer."""
+"""Samples from which a program is made at once; for fewer the formula or algorithm over arrays is quicker."""
+CALLS = 8
+"""Calls with fewer samples after which a program is made nevertheless: so many take as long as making it."""
 PYTHON_UP_TO = 100
 """Samples up to which a loop of generated Python is faster than NumPy's calls."""
 COMPILE_FROM = 10_000
@@ -76,6 +78,25 @@ def _flat(array: Array, batch: tuple[int, ...], count: int, group: Group) -> Arr
     return rows if rows.flags.c_contiguous else np.ascontiguousarray(rows)
 
 
+_asked: WeakKeyDictionary[Robot, Counter[Hashable]] = WeakKeyDictionary()
+
+
+def pays(what: Hashable, robot: Robot, *about: Hashable, count: int) -> bool:
+    """True if a program is worth making: for a large batch, or as the robot has been asked before.
+
+    A search over many robots, each asked once, makes none; a loop over the samples of one robot does.
+
+    Args:
+        what: names the program, with the robot and what else decides it.
+        robot: the robot.
+        about: the rest.
+        count: samples of this call.
+    """
+    calls = _asked.setdefault(robot, Counter())
+    calls[what, about] += 1 if count < FROM else CALLS
+    return calls[what, about] >= CALLS
+
+
 def chosen_path(program: Program, count: int) -> Way:
     """The path that ``run`` takes for so many samples."""
     if (count >= COMPILE_FROM or _is_kept(program)) and machine_code(program):
@@ -88,7 +109,7 @@ def large_batches() -> Way:
     return "C" if native.compiler() else "numpy"
 
 
-@cache
+@kept
 def machine_code(program: Program) -> native.Native | None:
     """The compiled program, None where that is not possible."""
     made = native.compiled(program)
@@ -96,13 +117,13 @@ def machine_code(program: Program) -> native.Native | None:
     return made
 
 
-@cache
+@lru_cache(KEPT)
 def _is_kept(program: Program) -> bool:
     """As ``native.is_kept``, asked once: the file system's answer takes longer than a sample."""
     return native.is_kept(program)
 
 
-@cache
+@kept
 def _ways(program: Program) -> Mapping[str, Callable[[Sequence[Array], Sequence[Array]], None]]:
     def by_numpy(inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
         emit_python.run_numpy(program, inputs, outputs)
@@ -127,23 +148,10 @@ def _ways(program: Program) -> Mapping[str, Callable[[Sequence[Array], Sequence[
     return {"numpy": by_numpy, "python": by_python, "C": by_c}
 
 
-@cache
+@kept
 def python_function(program: Program) -> Callable[..., Sequence[list[float]]]:
-    """The generated Python function: flat sequences of floats in, a list of floats for every output.
-
-    The module is written to the cache folder and imported from there.
-    """
-    made_by = Path(emit_python.__file__).read_text(encoding="utf-8")
-    file = native.cache_folder() / f"{program.name}_{digest(program.digest, made_by)[:16]}.py"
-    if not file.exists():
-        text = emit_python.source(program)
-        file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-        with atomic_path(file) as beside:
-            beside.write_text(text, encoding="utf-8")
-    spec = importlib.util.spec_from_file_location(f"screwkin_kernel_{program.name}", file)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    made_function: Callable[..., Sequence[list[float]]] = getattr(module, program.name)
-    return made_function
+    """The generated Python function: flat sequences of floats in, a list of floats for every output."""
+    names: dict[str, Any] = {}
+    exec(compile(emit_python.source(program), f"<{program.name}>", "exec"), names)  # noqa: S102
+    made: Callable[..., Sequence[list[float]]] = names[program.name]
+    return made

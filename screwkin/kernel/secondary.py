@@ -7,7 +7,6 @@ ankle, the virtual rotations of a hand) or are parallel, they fall apart into tw
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ import numpy as np
 from screwkin import scalar
 from screwkin.kernel.blocks import small
 from screwkin.kernel.davies import mechanism_of
-from screwkin.kernel.program import Program, Recorder
+from screwkin.kernel.program import Program, Recorder, kept
 from screwkin.kernel.records import identifier, pose_input
 from screwkin.kernel.run import run
 from screwkin.kinematics.positions import link_displacements
@@ -60,7 +59,7 @@ def secondary_rates(mechanism: Mechanism, T_world_base: Array, q: Array, primary
     return np.asarray(values)
 
 
-@cache
+@kept
 def followers(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, ...]) -> Program:
     """Rates of the secondary couplings, and a lower bound of every block's least singular value.
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
+
 import numpy as np
 import pytest
 
 import screwkin as sk
 from screwkin.kernel import body, davies, native
-from screwkin.kernel.formula import Formula, Tape
-from screwkin.kernel.run import run
+from screwkin.kernel.formula import Formula, Tape, Values
+from screwkin.kernel.program import Recorder
+from screwkin.kernel.run import CALLS, FROM, run
 from tests.kinematics.machines import random_state, random_tree
 
 PATHS = ["python", "numpy", *(["C"] if native.compiler() else [])]
@@ -71,26 +75,43 @@ def test_a_robot_without_joints_has_poses_and_no_columns_of_joints() -> None:
 def test_batches_of_several_axes_broadcast_on_either_path() -> None:
     robot = sk.load_robot("poppy12")
     inputs = told(body.momentum, robot, batch=(3, 1)) | {"qd": np.ones((5, 12)), "base_twist": np.ones(6)}
-    found, expected = body.momentum(robot, told=inputs), body.momentum.values(robot, told=inputs)
+    found = run(body.momentum.program(robot), inputs)
+    expected = body.momentum.values(robot, told=inputs)
     assert found["momentum"].shape == expected["momentum"].shape == (3, 5, 6)
     np.testing.assert_allclose(found["momentum"], expected["momentum"], atol=1e-12)
 
 
-def test_a_formula_is_recorded_once_for_a_robot_and_a_choice() -> None:
-    calls = []
+def test_a_formula_is_recorded_once_it_pays_and_computes_over_arrays_before() -> None:
+    told: list[type] = []
 
     @Formula
     def twice(tape: Tape, robot: sk.Robot, factor: int) -> None:
-        calls.append(factor)
+        told.append(type(tape))
         tape.title("twice", "Twice the positions.")
         tape.output("x", [factor * x for x in tape.input("q", len(robot.joints))])
 
-    robot = sk.load_robot("poppy12")
-    for count in (1, 5, 300):
-        for factor in (2, 3):
-            q = np.full((count, 12), 0.25)
-            np.testing.assert_array_equal(twice(robot, factor, told={"q": q})["x"], factor * q)
-    assert calls == [2, 3]
+    def ask(robot: sk.Robot, count: int, factor: int) -> None:
+        q = np.full((count, len(robot.joints)), 0.25)
+        np.testing.assert_array_equal(twice(robot, factor, told={"q": q})["x"], factor * q)
+
+    first, second = random_tree(1), random_tree(2)
+    for _ in range(2 * CALLS):
+        ask(first, 1, 2)
+    assert told == [Values] * (CALLS - 1) + [Recorder]
+    ask(second, FROM, 2)
+    ask(second, 1, 2)
+    assert told[CALLS:] == [Recorder], "a large batch is worth a program, which small ones then use"
+    ask(second, 1, 3)
+    assert told[CALLS + 1 :] == [Values], "another choice is another program"
+
+
+def test_a_search_over_robots_keeps_neither_robots_nor_programs() -> None:
+    robot = random_tree(3)
+    sk.link_poses(robot, random_state(robot, 3))
+    gone = weakref.ref(robot)
+    del robot
+    gc.collect()
+    assert gone() is None
 
 
 def test_equal_programs_share_a_name_on_disk_and_others_do_not() -> None:
