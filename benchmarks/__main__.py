@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 from benchmarks.environments import ROOT
-from benchmarks.machine import pin_threads
+from benchmarks.machine import keep_memory, pin_threads
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -37,4 +37,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
+    keep_memory()
     sys.exit(main())

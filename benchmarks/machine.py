@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import platform
 import subprocess
+import sys
 from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
@@ -12,6 +13,12 @@ from pathlib import Path
 from benchmarks.compiler import compiler
 
 WIDE = ("avx", "avx2", "fma", "avx512f", "avx512dq", "asimd", "sve")
+KEPT_MEMORY = {
+    "MALLOC_MMAP_MAX_": "0",
+    "MALLOC_TRIM_THRESHOLD_": str(1 << 40),
+    "MALLOC_TOP_PAD_": str(1 << 28),
+}
+"""glibc keeps the memory of results that are let go: otherwise every large result is mapped and zeroed anew."""
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 
@@ -19,6 +26,12 @@ def pin_threads(count: int = 1) -> None:
     """One thread for the libraries that start their own; must come before they are imported."""
     for name in THREADS:
         os.environ.setdefault(name, str(count))
+
+
+def keep_memory() -> None:
+    """On Linux, start this program anew with ``KEPT_MEMORY``, which glibc reads at the start."""
+    if sys.platform == "linux" and not KEPT_MEMORY.keys() <= os.environ.keys():
+        os.execve(sys.executable, [sys.executable, *sys.orig_argv[1:]], {**KEPT_MEMORY, **os.environ})
 
 
 def description(packages: Sequence[str]) -> dict[str, object]:
@@ -34,6 +47,7 @@ def description(packages: Sequence[str]) -> dict[str, object]:
         "system": f"{platform.system()} {platform.machine()}",
         "load": round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else None,
         "threads": {name: os.environ.get(name, "") for name in THREADS[:1]},
+        "memory": "kept" if KEPT_MEMORY.keys() <= os.environ.keys() else "as the system has it",
         "compiler": compiler_version(),
         "python": platform.python_version(),
         "versions": {name: version for name in packages if (version := version_of(name))},

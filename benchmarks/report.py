@@ -31,7 +31,8 @@ def _machine(machine: dict[str, Any]) -> list[str]:
     processor = f"{machine['processor']} ({machine['family']})" if machine["family"] else machine["processor"]
     return [
         f"{processor}, {machine['cores']} cores, {' '.join(machine['instructions'])}; "
-        f"{machine['system']}; load {machine['load']} at the start; one thread where nothing else is said.",
+        f"{machine['system']}; load {machine['load']} at the start; one thread where nothing else is said; "
+        f"memory of results {machine['memory']}.",
         f"{machine['compiler']}; Python {machine['python']}, {versions}.",
     ]
 
