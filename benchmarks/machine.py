@@ -18,7 +18,7 @@ KEPT_MEMORY = {
     "MALLOC_TRIM_THRESHOLD_": str(1 << 40),
     "MALLOC_TOP_PAD_": str(1 << 28),
 }
-"""glibc keeps the memory of results that are let go: otherwise every large result is mapped and zeroed anew."""
+"""glibc keeps the memory of results that are let go; otherwise every large one is mapped and zeroed anew."""
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 

@@ -21,7 +21,7 @@ import screwkin
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 FLOORS: dict[str, int] = {
-    "errors": 0, "files": 0, "scalar": 0, "se3": 0, "screw": 0,
+    "errors": 0, "files": 0, "cache": 0, "scalar": 0, "se3": 0, "screw": 0,
     "model": 1,
     "kinematics": 2, "mechanism": 2,
     "solve": 3, "dynamics": 3, "kernel": 3,

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 from screwkin.analysis.chains import Chain, by_dh, by_screws, by_steps
+from screwkin.analysis.chains import __file__ as chains_file
+from screwkin.cache import remembered
 from screwkin.kinematics.positions import screws_in
 from screwkin.screw import Screw
 from screwkin.se3 import UNTURNED, Pose, Twist, Vector, leaves, map_scalars
@@ -30,7 +34,16 @@ def operations(chains: Sequence[Chain]) -> Mapping[str, Count]:
     - ``screw_best_reference``: the same, with each chain's screws told at the joint axis where that is
       cheapest; the Jacobian is told there too, the tip's pose still in the base frame;
     - ``screw_by_steps``: the same screws, carried from axis point to axis point.
+
+    Counting takes seconds, so what was counted once is kept in the cache folder.
     """
+    text = (Path(module).read_text(encoding="utf-8") for module in (__file__, chains_file))
+    made_of = "\n".join([repr(tuple(chains)), version("sympy"), *text])
+    counted: Mapping[str, Count] = remembered("operations", made_of, lambda: _counted(chains))
+    return counted
+
+
+def _counted(chains: Sequence[Chain]) -> Mapping[str, Count]:
     each: dict[str, list[Count]] = {"dh": [], "screw": [], "screw_best_reference": [], "screw_by_steps": []}
     for chain in chains:
         joints = len(chain.screws)

@@ -18,10 +18,11 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from screwkin.cache import cache_folder, digest
 from screwkin.errors import OutputError
 from screwkin.files import atomic_path
 from screwkin.kernel import emit_c, series
-from screwkin.kernel.program import Program, digest
+from screwkin.kernel.program import Program
 
 Array = Any
 
@@ -34,18 +35,6 @@ TUNED = ("-fschedule-insns", "-fsched-pressure")
 """Tried first, as not every compiler knows them: operations that wait for nothing move in front of others."""
 THREADED_FROM = 8192
 """Samples from which the batch is shared among the processor's cores."""
-
-
-def cache_folder() -> Path:
-    """Where compiled kernels are kept: ``$SCREWKIN_CACHE``, else the user's cache folder."""
-    return _folder(os.environ.get("SCREWKIN_CACHE"))
-
-
-@cache
-def _folder(wanted: str | None) -> Path:
-    import platformdirs
-
-    return Path(wanted or platformdirs.user_cache_dir("screwkin", appauthor=False))
 
 
 @cache

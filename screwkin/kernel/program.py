@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -10,6 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from typing import Any, TypeVar
 
+from screwkin.cache import digest
 from screwkin.kernel.graph import Graph, Node
 from screwkin.se3 import leaves
 
@@ -86,11 +86,6 @@ class Program:
     def operations(self) -> int:
         """Number of operations, sign changes apart (they are absorbed)."""
         return len(self.steps) - self.counts.get("neg", 0)
-
-
-def digest(*told: str) -> str:
-    """A name for what texts say."""
-    return hashlib.sha256("\n".join(told).encode()).hexdigest()[:32]
 
 
 class Recorder:

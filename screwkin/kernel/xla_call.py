@@ -19,8 +19,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax import lax
 
+from screwkin.cache import digest
 from screwkin.kernel import emit_c, emit_jax, native
-from screwkin.kernel.program import Group, Program, digest
+from screwkin.kernel.program import Group, Program
 
 Array = Any
 
