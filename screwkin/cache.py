@@ -1,4 +1,4 @@
-"""What takes long to make and stays the same, kept in the user's cache folder, which may be deleted any time."""
+"""What takes long to make and stays the same: kept in the user's cache folder, which may be deleted."""
 
 from __future__ import annotations
 
