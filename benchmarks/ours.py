@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from screwkin.kernel.run import run as kernel
 from screwkin.model.robot import Robot
 
 Array = Any
+T = TypeVar("T")
 
 NAME = "screwkin"
 
@@ -39,9 +41,14 @@ def rates(robot: Robot, given: Motion) -> Contestants:
         followed = sk.secondary_rates(mechanism, state, primary)
         return {"poses": np.stack(poses, axis=1), "rates": followed[:, joints]}
 
-    for _ in range(CALLS):  # after which small batches are computed by programs, too
+    return {f"{NAME}, public functions": Contestant(_warm(run)), **_rate_kernels(robot, given)}
+
+
+def _warm(run: Callable[[], T]) -> Callable[[], T]:
+    """Called so often that small batches are computed by programs, too."""
+    for _ in range(CALLS):
         run()
-    return {f"{NAME}, public functions": Contestant(run), **_rate_kernels(robot, given)}
+    return run
 
 
 def _rate_kernels(robot: Robot, given: Motion) -> Contestants:
@@ -117,7 +124,7 @@ def reach(robot: Robot, given: Reach) -> Contestants:
     def nearest(found: Any) -> Result:
         return {"q": found["q"], "solved": (found["found"] == 1)[:, 0] & (found["error"] <= 1e-11)[:, 0]}
 
-    contestants = {f"{NAME}, public functions": Contestant(run, result, "all branches in closed form")}
+    contestants = {f"{NAME}, public functions": Contestant(_warm(run), result, "all branches in closed form")}
     if machine_code(program) is not None:
         note = "the closed form's branch nearest to the guess"
         contestants[f"{NAME}, C kernel"] = Contestant(lambda: kernel(program, told, path="C"), nearest, note)
@@ -132,7 +139,10 @@ def positions(robot: Robot, given: Stance) -> Contestants:
     def result(found: Any) -> Result:
         return {"q": found.state.q, "solved": found.status == 0}
 
-    return {f"{NAME}, public functions": Contestant(lambda: sk.solve_pose(robot, targets, guess), result)}
+    def run() -> Any:
+        return sk.solve_pose(robot, targets, guess)
+
+    return {f"{NAME}, public functions": Contestant(_warm(run), result)}
 
 
 def balance(robot: Robot, given: Dynamic) -> Contestants:
@@ -148,7 +158,7 @@ def balance(robot: Robot, given: Dynamic) -> Contestants:
     program = body.balance.program(robot)
     told = {"T_world_base": given.T_world_base, "q": given.q, "qd": given.qd, "qdd": given.qdd}
     told |= {"base_twist": given.twist, "base_acceleration": given.acceleration}
-    contestants = {f"{NAME}, public functions": Contestant(run)}
+    contestants = {f"{NAME}, public functions": Contestant(_warm(run))}
     if machine_code(program) is not None:
         asked = ("com", "momentum", "zmp")
         contestants[f"{NAME}, C kernel"] = Contestant(

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from screwkin.kernel.program import Program, Recorder, kept
 from screwkin.kernel.records import matrix
-from screwkin.kernel.run import chosen_path, run
+from screwkin.kernel.run import chosen_path, python_function, run
 from screwkin.model.state import RIGID, not_rigid
 from screwkin.scalar import Scalar, where
 from screwkin.se3 import Pose, Rotation, Vector, cross, dot
@@ -16,14 +18,12 @@ from screwkin.solve.quartic import abs_
 Array = Any
 
 
-FEW = 8
-"""Matrices up to which generated Python is quicker than NumPy's linear algebra."""
-
-
 def foreign(T: Array) -> Array:
     """Which of the matrices (..., 4, 4) are no rigid displacements (...,)."""
-    count = T.size // 16
-    if count > FEW and chosen_path(poses(False), count) != "C":
+    if T.ndim == 2:  # what a loop over samples asks: without the cost of arrays
+        ((deviation,),) = python_function(poses(False))(T.ravel().tolist())
+        return np.asarray(deviation > RIGID)
+    if chosen_path(poses(False), T.size // 16) != "C":
         return not_rigid(T)
     return run(poses(False), {"T": T})["deviation"][..., 0] > RIGID
 

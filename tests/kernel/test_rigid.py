@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import screwkin as sk
 from screwkin.errors import InputError, ShapeError
-from screwkin.kernel.rigid import FEW, foreign, nearest_poses
+from screwkin.kernel.rigid import foreign, nearest_poses
 from screwkin.kernel.run import FROM
 
 
@@ -30,13 +30,14 @@ def test_deviation_is_the_largest_entry_that_is_wrong():
     np.testing.assert_allclose(nearest_poses(T)[0], expected, atol=1e-14)
 
 
-@pytest.mark.parametrize("count", [4, FEW, FEW + 2, 300, 20_000])
+@pytest.mark.parametrize("count", [4, 300, 20_000])
 def test_what_is_no_pose_is_found_in_batches_of_every_size(count):
     T, rng = poses(count)
     assert not foreign(T).any()
     bad = rng.random(count) < 0.5
     T[bad, :3, 0] *= 1 + 1e-5
     np.testing.assert_array_equal(foreign(T), bad)
+    np.testing.assert_array_equal([foreign(one) for one in T[:50]], bad[:50])
     np.testing.assert_array_equal(foreign(T.reshape(2, -1, 4, 4)[:, :2]), bad.reshape(2, -1)[:, :2])
 
 
