@@ -65,7 +65,7 @@ def frame_pose(tape: Tape, robot: Robot, frame: str) -> None:
 def jacobian(tape: Tape, robot: Robot, frame: str, own: bool) -> None:
     """Screw Jacobian of a frame at its own origin, or at a point of the world."""
     tape.title(
-        identifier(robot.name, frame, "jacobian", "" if own else "at_point"),
+        identifier(robot.name, frame, "jacobian", *([] if own else ["at_point"])),
         f"Jacobian of {frame} of {robot.name}: rows [omega; v at {'its origin' if own else 'the point'}],"
         " world axes; columns: twist of the base at the same point, joint rates.",
     )

@@ -62,7 +62,11 @@ def _weighing(make: Callable[[Robot], Program]) -> Callable[[Robot], list[Progra
 
 KINDS: Mapping[str, Callable[[Robot], list[Program]]] = {
     "tips": lambda robot: [body.tip_poses.program(robot)] if robot.limbs else [],
+    "links": lambda robot: [body.link_poses.program(robot)],
+    "jacobian": lambda robot: [body.limb_jacobian.program(robot, x.name) for x in robot.limbs],
     "com": _weighing(body.center_of_mass.program),
+    "mass_matrix": _weighing(body.mass_matrix.program),
+    "inverse_dynamics": _weighing(body.inverse_dynamics.program),
     "rates": _rates(False),
     "motion": _rates(True),
     "zmp": _weighing(body.balance.program),
@@ -85,7 +89,7 @@ def programs_of(robot: Robot, kinds: Sequence[str]) -> list[Program]:
             raise UnknownNameError("kind of program", kind, tuple(KINDS))
         made = KINDS[kind](robot)
         if not made:
-            lacks = "limb" if kind == "tips" else "limb with a closed form"
+            lacks = "limb with a closed form" if kind == "ik" else "limb"
             raise InputError(f"{robot.name} has no {lacks}, which {kind} needs")
         found |= {program.name: program for program in made}
     if not found:

@@ -29,7 +29,7 @@ def coupling_screws(tape: Tape, robot: Robot, primary: Names, secondary: Names, 
     """Normalised screws of all couplings, columns [omega; v], at the base origin or at a point."""
     mechanism = mechanism_of(robot, primary, secondary)
     tape.title(
-        identifier(robot.name, "screws", "" if at_base else "at_point"),
+        identifier(robot.name, "screws", *([] if at_base else ["at_point"])),
         f"Screws of the couplings of {robot.name}: columns [omega; v at the"
         f" {'base origin' if at_base else 'point'}], world axes.",
     )

@@ -10,7 +10,7 @@ from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import Any, Protocol
 
 from screwkin.kernel.program import Group, Program, Recorder, kept
-from screwkin.kernel.run import common_batch, pays, run
+from screwkin.kernel.run import FROM, common_batch, pays, run
 from screwkin.model.robot import Robot
 from screwkin.scalar import Scalar, is_jax
 from screwkin.se3 import as_array, leaves, unstack
@@ -84,11 +84,16 @@ class Formula:
     def __call__(self, robot: Robot, *about: Hashable, told: Mapping[str, Array]) -> dict[str, Array]:
         """Every output by name, (*batch, *shape).
 
-        By the formula where JAX is told, or where little is asked (``run.pays``); else by the program.
+        By the program, or where it does not pay (``run.pays``) by the formula. Of JAX arrays, which may be
+        traced, the number of samples alone decides.
         """
-        if any(is_jax(array) for array in told.values()):
-            return self.values(robot, *about, told=told)
         count = max(array.size // _row(name, array) for name, array in told.items())
+        if any(is_jax(array) for array in told.values()):
+            if count < FROM:
+                return self.values(robot, *about, told=told)
+            from screwkin.kernel import xla_call
+
+            return xla_call.run(self.program(robot, *about), told)
         if pays(self, robot, *about, count=count):
             return run(self.program(robot, *about), told)
         return self.values(robot, *about, told=told)

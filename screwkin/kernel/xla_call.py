@@ -8,8 +8,7 @@ function stands in.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import cache
+from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -21,12 +20,12 @@ from jax import lax
 
 from screwkin.cache import digest
 from screwkin.kernel import emit_c, emit_jax, native
-from screwkin.kernel.program import Group, Program
+from screwkin.kernel.program import Group, Program, kept
 
 Array = Any
 
 
-@cache
+@kept
 def function(program: Program) -> Callable[..., tuple[Array, ...]]:
     """The program as a function of its inputs, arrays (*batch, *shape), to its outputs, likewise.
 
@@ -66,6 +65,18 @@ def function(program: Program) -> Callable[..., tuple[Array, ...]]:
     return chosen
 
 
+def run(program: Program, inputs: Mapping[str, Array]) -> dict[str, Array]:
+    """As ``run.run``, for JAX arrays: every output by name, (*batch, *shape)."""
+    found = _jitted(program)(*(inputs[group.name] for group in program.inputs))
+    return {group.name: array for group, array in zip(program.outputs, found, strict=True)}
+
+
+@kept
+def _jitted(program: Program) -> Callable[..., tuple[Array, ...]]:
+    jitted: Callable[..., tuple[Array, ...]] = jax.jit(function(program))
+    return jitted
+
+
 def _batch_first(program: Program) -> Callable[..., tuple[Array, ...]]:
     """``emit_jax.function`` with the batch in front."""
     last = emit_jax.function(program)
@@ -86,7 +97,7 @@ def _batch_first(program: Program) -> Callable[..., tuple[Array, ...]]:
     return compute
 
 
-@cache
+@kept
 def _target(program: Program) -> str | None:
     """The program's handler, compiled and told to XLA under a name that its text decides; None without."""
     if not all(group.size for group in (*program.inputs, *program.outputs)):

@@ -21,6 +21,7 @@ needs_compiler = pytest.mark.skipif(native.compiler() is None, reason="no C comp
         ("poppy12", "ik,motion,com,zmp", "double"),
         ("poppy12", "ik,motion,com,zmp", "float"),
         ("poppy12", "deflection", "float"),
+        ("poppy12", "links,jacobian,mass_matrix,inverse_dynamics", "double"),
     ],
 )
 def test_generated_c_compiles_without_warnings_and_its_driver_passes(cli, tmp_path, robot, what, kind):
