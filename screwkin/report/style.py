@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,6 +22,10 @@ WAIST, GCOM, ZMP, MEASURED, PLAIN, GOOD = "#333333", "#009E73", "#AA3377", "#E69
 LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)))
 
 WIDTH, DPI = 8.4, 130
+LEFT, RIGHT, BOTTOM, TOP, BETWEEN = 0.78, 0.14, 0.47, 0.16, 0.16
+"""Margins of stacked axes and what is between them [inch]: numbers and a label fit, none needs measuring."""
+ROW = 0.21
+"""Height of one row of a legend above [inch]."""
 
 STYLE: Mapping[str, Any] = {
     "font.family": "DejaVu Sans",
@@ -57,11 +62,27 @@ def styled() -> Iterator[None]:
 
 
 def new_figure(height: float, rows: int = 1, columns: int = 1, **options: Any) -> tuple[Figure, Any]:
-    """A figure without window or global state, and its axes (an array if there are several)."""
+    """A figure without window or global state, and its axes (an array if there are several).
+
+    Stacked axes have fixed margins: to measure all texts, which axes side by side need, takes as long as to
+    draw them.
+    """
     from matplotlib.figure import Figure as Canvas
 
-    figure = Canvas(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
+    if columns > 1:
+        figure = Canvas(figsize=(WIDTH, height), dpi=DPI, layout="constrained")
+        return figure, figure.subplots(rows, columns, **options)
+    figure = Canvas(figsize=(WIDTH, height), dpi=DPI)
+    figure.subplots_adjust(LEFT / WIDTH, BOTTOM / height, 1 - RIGHT / WIDTH)
+    _leave_above(figure, rows, TOP)
     return figure, figure.subplots(rows, columns, **options)
+
+
+def _leave_above(figure: Figure, rows: int, space: float) -> None:
+    """Put the upper end of stacked axes so far [inch] below the figure's."""
+    height = figure.get_figheight()
+    mean = (height - space - BOTTOM - (rows - 1) * BETWEEN) / rows
+    figure.subplots_adjust(top=1 - space / height, hspace=BETWEEN / mean)
 
 
 def save_figure(figure: Figure, path: Path) -> Path:
@@ -71,7 +92,9 @@ def save_figure(figure: Figure, path: Path) -> Path:
         OutputError: it cannot be written.
     """
     with atomic_path(path) as beside:
-        figure.savefig(beside, format="png", dpi=DPI, metadata={"Software": None})
+        figure.savefig(
+            beside, format="png", dpi=DPI, metadata={"Software": None}, pil_kwargs={"compress_level": 3}
+        )
     return path
 
 
@@ -125,7 +148,21 @@ def legend_above(figure: Figure, axes: Sequence[Axes], columns: int = 6) -> None
     for one in axes:
         for handle, label in zip(*one.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
-    if entries:
-        figure.legend(
-            entries.values(), entries.keys(), loc="outside upper left", ncols=min(columns, len(entries))
-        )
+    if not entries:
+        return
+    columns = min(columns, len(entries))
+    if figure.get_layout_engine() is not None:
+        figure.legend(entries.values(), entries.keys(), loc="outside upper left", ncols=columns)
+        return
+    rows = axes[0].get_gridspec().nrows
+    _leave_above(figure, rows, TOP + ROW * math.ceil(len(entries) / columns))
+    left = (LEFT / WIDTH, 1 - 0.08 / figure.get_figheight())
+    figure.legend(
+        entries.values(),
+        entries.keys(),
+        loc="upper left",
+        bbox_to_anchor=left,
+        ncols=columns,
+        borderaxespad=0.0,
+        borderpad=0.0,
+    )
