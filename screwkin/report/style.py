@@ -24,8 +24,8 @@ LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)))
 WIDTH, DPI = 8.4, 130
 LEFT, RIGHT, BOTTOM, TOP, BETWEEN = 0.78, 0.14, 0.47, 0.16, 0.16
 """Margins of stacked axes and what is between them [inch]: numbers and a label fit, none needs measuring."""
-ROW = 0.21
-"""Height of one row of a legend above [inch]."""
+ROW, HANDLE, LETTER = 0.21, 0.57, 0.06
+"""Height of a legend's row; width of an entry without its label, and of a label's letter [inch]."""
 
 STYLE: Mapping[str, Any] = {
     "font.family": "DejaVu Sans",
@@ -154,6 +154,7 @@ def legend_above(figure: Figure, axes: Sequence[Axes], columns: int = 6) -> None
     if figure.get_layout_engine() is not None:
         figure.legend(entries.values(), entries.keys(), loc="outside upper left", ncols=columns)
         return
+    columns = _columns_that_fit(list(entries), columns)
     rows = axes[0].get_gridspec().nrows
     _leave_above(figure, rows, TOP + ROW * math.ceil(len(entries) / columns))
     left = (LEFT / WIDTH, 1 - 0.08 / figure.get_figheight())
@@ -166,3 +167,13 @@ def legend_above(figure: Figure, axes: Sequence[Axes], columns: int = 6) -> None
         borderaxespad=0.0,
         borderpad=0.0,
     )
+
+
+def _columns_that_fit(labels: Sequence[str], most: int) -> int:
+    """Columns of a legend, filled one after the other, that are not wider than the axes below."""
+    for columns in range(most, 1, -1):
+        rows = math.ceil(len(labels) / columns)
+        each = [labels[k : k + rows] for k in range(0, len(labels), rows)]
+        if sum(HANDLE + LETTER * max(map(len, one)) for one in each) < WIDTH - LEFT - RIGHT + HANDLE / 2:
+            return columns
+    return 1
