@@ -28,7 +28,7 @@ def _folder(wanted: str | None) -> Path:
 
 def digest(*told: str) -> str:
     """A name for what texts say."""
-    return hashlib.sha256("\n".join(told).encode()).hexdigest()[:32]
+    return hashlib.sha256("\0".join(told).encode()).hexdigest()[:32]
 
 
 def remembered(name: str, made_of: str, make: Callable[[], Any]) -> Any:
@@ -43,7 +43,7 @@ def remembered(name: str, made_of: str, make: Callable[[], Any]) -> Any:
     try:
         return json.loads(file.read_text(encoding="utf-8"))
     except (OSError, ValueError):
-        made = make()
+        made = json.loads(json.dumps(make()))
     try:
         file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         with atomic_write(file) as beside:

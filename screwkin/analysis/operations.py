@@ -8,12 +8,18 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
+from screwkin import scalar, screw, se3
+from screwkin.analysis import chains
 from screwkin.analysis.chains import Chain, by_dh, by_screws, by_steps
-from screwkin.analysis.chains import __file__ as chains_file
 from screwkin.cache import remembered
+from screwkin.kinematics import positions
 from screwkin.kinematics.positions import screws_in
+from screwkin.model import dh
 from screwkin.screw import Screw
 from screwkin.se3 import UNTURNED, Pose, Twist, Vector, leaves, map_scalars
+
+_COUNTED = (chains, positions, dh, screw, se3, scalar)
+"""Modules whose formulas are counted."""
 
 Model = Callable[[Sequence[Any]], tuple[Pose, list[Twist]]]
 """Tip pose and Jacobian columns of a chain for its joint positions."""
@@ -37,7 +43,8 @@ def operations(chains: Sequence[Chain]) -> Mapping[str, Count]:
 
     Counting takes seconds, so what was counted once is kept in the cache folder.
     """
-    text = (Path(module).read_text(encoding="utf-8") for module in (__file__, chains_file))
+    text = [Path(str(module.__file__)).read_text(encoding="utf-8") for module in _COUNTED]
+    text.append(Path(__file__).read_text(encoding="utf-8"))
     made_of = "\n".join([repr(tuple(chains)), version("sympy"), *text])
     counted: Mapping[str, Count] = remembered("operations", made_of, lambda: _counted(chains))
     return counted

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from screwkin.errors import ShapeError
+from screwkin.kernel.formula import MATRICES
 from screwkin.kernel.rigid import foreign
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
@@ -29,6 +30,8 @@ def checked(name: str, array: Any, *shape: int) -> Array:
             )
     else:
         try:
+            if array is None:
+                raise TypeError("it is None")
             array = np.asarray(array, dtype=float)
         except (TypeError, ValueError) as error:
             raise ShapeError(f"{name} is not an array of numbers: {error}") from None
@@ -58,10 +61,12 @@ def rigid(name: str, T: Array) -> Array:
     return T
 
 
-def told(robot: Robot, state: State, **more: tuple[Any, int]) -> dict[str, Array]:
-    """The inputs of a formula, checked: a state and more arrays with the size of their last axis.
+Told = tuple[str, Any, int]
+"""An argument: its name for messages, its value, and the size of its last axis."""
 
-    None stands for zeros.
+
+def told(robot: Robot, state: State, more: Mapping[str, Told] | None = None) -> dict[str, Array]:
+    """The inputs of a formula by their names on its tape, checked: a state, and more.
 
     Raises:
         ShapeError: a wrong shape, NaN or infinity, a base pose that is not rigid, or batches that do not fit.
@@ -70,20 +75,26 @@ def told(robot: Robot, state: State, **more: tuple[Any, int]) -> dict[str, Array
         "T_world_base": checked("state.T_world_base", state.T_world_base, 4, 4),
         "q": checked("state.q", state.q, len(robot.joints)),
     }
-    for name, (value, size) in more.items():
-        found[name] = np.zeros(size) if value is None else checked(name, value, size)
-    one_batch({"T_world_base": 2}, found)
+    names = {"T_world_base": "state.T_world_base", "q": "state.q"}
+    for key, (name, value, size) in (more or {}).items():
+        found[key], names[key] = checked(name, value, size), name
+    common_batch({names[key]: (a, 2 if key in MATRICES else 1) for key, a in found.items()})
     rigid("state.T_world_base", found["T_world_base"])
     return found
 
 
-def one_batch(inner: Mapping[str, int], arrays: Mapping[str, Array]) -> tuple[int, ...]:
-    """The batch to which arrays broadcast, with ``inner`` axes behind it (one where nothing is said).
+def or_rest(twist: Any) -> Any:
+    """A twist or its derivative, zero where none is told."""
+    return np.zeros(6) if twist is None else twist
+
+
+def common_batch(arrays: Mapping[str, tuple[Array, int]]) -> tuple[int, ...]:
+    """The batch to which arrays broadcast; each by its name for messages, with its number of other axes.
 
     Raises:
         ShapeError: there is none.
     """
-    batches = {name: a.shape[: a.ndim - inner.get(name, 1)] for name, a in arrays.items()}
+    batches = {name: a.shape[: a.ndim - inner] for name, (a, inner) in arrays.items()}
     try:
         return np.broadcast_shapes(*batches.values())
     except ValueError:

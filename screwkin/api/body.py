@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from screwkin.api.arrays import Array, told
+from screwkin.api.arrays import Array, checked, or_rest, told
 from screwkin.dynamics.newton_euler import GRAVITY
 from screwkin.errors import InputError
 from screwkin.kernel import body
@@ -67,8 +67,8 @@ def jacobian(robot: Robot, state: State, frame: str, point: Any = None) -> Array
         point: world point (..., 3) [m] at which twists are told; default: the frame's own origin.
     """
     robot.frame(frame)
-    at = {} if point is None else {"point": (point, 3)}
-    return body.jacobian(robot, frame, point is None, told=told(robot, state, **at))["J"]
+    at = {} if point is None else {"point": ("point", point, 3)}
+    return body.jacobian(robot, frame, point is None, told=told(robot, state, at))["J"]
 
 
 def center_of_mass(robot: Robot, state: State) -> Array:
@@ -109,8 +109,11 @@ def momentum(robot: Robot, state: State, qd: Any, base_twist: Any = None) -> Arr
         InputError: no link has a mass.
     """
     _check_mass(robot)
-    moving = told(robot, state, qd=(qd, len(robot.joints)), base_twist=(base_twist, 6))
-    return body.momentum(robot, told=moving)["momentum"]
+    moving = {
+        "qd": ("qd", qd, len(robot.joints)),
+        "base_twist": ("base_twist", or_rest(base_twist), 6),
+    }
+    return body.momentum(robot, told=told(robot, state, moving))["momentum"]
 
 
 def mass_matrix(robot: Robot, state: State) -> Array:
@@ -119,18 +122,17 @@ def mass_matrix(robot: Robot, state: State) -> Array:
 
 
 def _moving(
-    robot: Robot, state: State, qd: Any, qdd: Any, base_twist: Any, base_acceleration: Any, gravity: float
+    robot: Robot, state: State, qd: Any, qdd: Any, base_twist: Any, base_acceleration: Any, gravity: Any
 ) -> dict[str, Array]:
     n = len(robot.joints)
-    return told(
-        robot,
-        state,
-        qd=(qd, n),
-        qdd=(qdd, n),
-        base_twist=(base_twist, 6),
-        base_acceleration=(base_acceleration, 6),
-        gravity=([gravity], 1),
-    )
+    moving = {
+        "qd": ("qd", qd, n),
+        "qdd": ("qdd", qdd, n),
+        "base_twist": ("base_twist", or_rest(base_twist), 6),
+        "base_acceleration": ("base_acceleration", or_rest(base_acceleration), 6),
+        "gravity": ("gravity", checked("gravity", gravity)[..., None], 1),
+    }
+    return told(robot, state, moving)
 
 
 def inverse_dynamics(
@@ -140,7 +142,7 @@ def inverse_dynamics(
     qdd: Any,
     base_twist: Any = None,
     base_acceleration: Any = None,
-    gravity: float = GRAVITY,
+    gravity: Any = GRAVITY,
 ) -> Array:
     """Generalised force (..., 6+n): wrench [m; f] on the base about its origin (world axes), joint torques.
 
@@ -151,7 +153,7 @@ def inverse_dynamics(
         qdd: joint accelerations (..., n).
         base_twist: [omega; v of the base origin], world axes (..., 6); default zero.
         base_acceleration: its time derivative [alpha; a]; default zero.
-        gravity: [m/s^2], along -z of the world.
+        gravity: [m/s^2], along -z of the world; a number, or one for every sample (...,).
     """
     moving = _moving(robot, state, qd, qdd, base_twist, base_acceleration, gravity)
     return body.inverse_dynamics(robot, told=moving)["force"]
@@ -164,7 +166,7 @@ def ground_wrench(
     qdd: Any,
     base_twist: Any,
     base_acceleration: Any,
-    gravity: float = GRAVITY,
+    gravity: Any = GRAVITY,
 ) -> Array:
     """Wrench (..., 6) that the ground must give, [m; f] about the world origin, world axes."""
     moving = _moving(robot, state, qd, qdd, base_twist, base_acceleration, gravity)

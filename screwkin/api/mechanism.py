@@ -8,13 +8,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from screwkin.api.arrays import Array, checked, one_batch, rigid, told
+from screwkin.api.arrays import Array, Told, checked, common_batch, rigid, told
 from screwkin.api.body import home
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.kernel import davies
 from screwkin.kernel.pose import solve_pose_fast
-from screwkin.kernel.records import identifier
-from screwkin.kernel.run import pays
+from screwkin.kernel.run import FROM, pays
 from screwkin.kernel.secondary import secondary_rates as kernel_rates
 from screwkin.mechanism import network
 from screwkin.mechanism import virtual_motion as virtual
@@ -40,9 +39,9 @@ def network_matrix(mechanism: Mechanism, state: State, point: Any = None) -> Arr
 
     Source: paper A, eq. 8-9.
     """
-    at = {} if point is None else {"point": (point, 3)}
+    at = {} if point is None else {"point": ("point", point, 3)}
     choice = mechanism.robot, mechanism.primary, mechanism.secondary
-    found = davies.coupling_screws(*choice, point is None, told=told(mechanism.robot, state, **at))
+    found = davies.coupling_screws(*choice, point is None, told=told(mechanism.robot, state, at))
     return network.assembled(mechanism, found["S"])
 
 
@@ -63,29 +62,37 @@ def virtual_motion(
 
     Source: paper A, eq. 7.
     """
-    moving, whole = dict[str, tuple[Any, int]](), []
+    moving, whole = dict[str, Told](), []
     chains = virtual.imposing_chains(mechanism)
-    for chain in chains:
+    for k, chain in enumerate(chains):
         wanted = [name for name in chain.names if name in mechanism.primary]
         given = base_twist if chain.limb is None else tip_twists.get(chain.name)
+        named = "base_twist" if chain.limb is None else f"tip_twists[{chain.name!r}]"
         if given is None:
-            raise InputError(f"tip_twists lacks {chain.name}, but {', '.join(wanted)} are primary")
-        size = 3 if np.shape(given)[-1:] == (3,) else 6
+            lacks = "base_twist is None" if chain.limb is None else f"tip_twists lacks {chain.name}"
+            raise InputError(f"{lacks}, but {', '.join(wanted)} are primary")
+        size = 3 if _length(given) == 3 else 6
         if size == 6:
             whole.append(chain.name)
         elif any(name.split(".")[1][0] == "r" for name in wanted):
             raise InputError(f"the twist of {chain.name} has 3 components, but its rotations are primary")
-        moving[chain.name] = (given, size)
+        moving[f"twist_{k}"] = (named, given, size)
     virtually = {name for chain in chains for name in chain.names}
     real = [name for name in mechanism.primary if name not in virtually]
     if real:
         raise InputError(
             f"primary couplings {', '.join(real)} belong to no virtual chain; give their rates directly"
         )
-    inputs = told(mechanism.robot, state, **moving)
-    inputs |= {identifier("twist", name): inputs.pop(name) for name in moving}
     choice = mechanism.robot, mechanism.primary, mechanism.secondary
-    return davies.primary_rates(*choice, tuple(whole), told=inputs)["primary"]
+    return davies.primary_rates(*choice, tuple(whole), told=told(mechanism.robot, state, moving))["primary"]
+
+
+def _length(value: Any) -> int:
+    """Of the last axis; 0 for what is no array."""
+    try:
+        return int(np.shape(value)[-1])
+    except (ValueError, IndexError):
+        return 0
 
 
 def secondary_rates(
@@ -110,7 +117,11 @@ def secondary_rates(
         raise InputError(f"on_singular is {on_singular!r}; valid: raise, status")
     fast = _by_program(mechanism, state, primary)
     if fast is not None:
-        return (fast, _status(np.zeros((), dtype=bool), fast.shape[:-1])) if on_singular == "status" else fast
+        values, singular = fast
+        if on_singular == "status":
+            return values, _status(singular, values.shape[:-1])
+        if not singular.any():
+            return values
     N = network_matrix(mechanism, state)
     solution = rates.secondary_rates(mechanism, N, primary)
     singular = solution.singular
@@ -120,25 +131,24 @@ def secondary_rates(
     return solution.values
 
 
-def _by_program(mechanism: Mechanism, state: State, primary: Array) -> Array | None:
-    """Secondary rates by the kernel; None where a sample is singular, or no program is worth making."""
-    if is_jax(primary):
-        return None
+def _by_program(mechanism: Mechanism, state: State, primary: Array) -> tuple[Array, Array] | None:
+    """Secondary rates by the kernel, and which samples are singular; None where no program pays."""
     arrays = told(mechanism.robot, state)
-    if any(map(is_jax, arrays.values())):
+    T, q = arrays["T_world_base"], arrays["q"]
+    if any(map(is_jax, (T, q, primary))):
         return None
-    arrays["primary_rates"] = primary
-    inner = {"T_world_base": 2}
-    batch = one_batch(inner, arrays)
+    batch = common_batch({"state.T_world_base": (T, 2), "state.q": (q, 1), "primary_rates": (primary, 1)})
     choice = mechanism.primary, mechanism.secondary
     if not pays("secondary_rates", mechanism.robot, *choice, count=math.prod(batch)):
         return None
-    flat = []
-    for name, a in arrays.items():
-        shape = a.shape[a.ndim - inner.get(name, 1) :]
-        flat.append(np.broadcast_to(a, (*batch, *shape)).reshape(-1, *shape))
-    values = kernel_rates(mechanism, *flat)
-    return None if values is None else values.reshape(*batch, len(mechanism.secondary))
+    flat = [
+        np.broadcast_to(a, (*batch, *inner)).reshape(-1, *inner)
+        for a, inner in ((T, T.shape[-2:]), (q, q.shape[-1:]), (primary, primary.shape[-1:]))
+    ]
+    found = kernel_rates(mechanism, *flat)
+    if found is None:
+        return None
+    return found[0].reshape(*batch, len(mechanism.secondary)), found[1].reshape(batch)
 
 
 def _status(singular: Array, batch: tuple[int, ...]) -> Array:
@@ -164,8 +174,8 @@ def solve_pose(
         targets: ``"base"`` (..., 4, 4) and tips by name: a pose (..., 4, 4), or a position (..., 3) with the
             orientation free; world frame.
         guess: a nearby state; default ``home``. Its base pose holds where ``"base"`` is not given.
-        method: ``"newton"``, through the network matrix; ``"auto"``: for large batches, or when asked again
-            and again, the closed forms of the limbs where they have some: the solution nearest to the guess.
+        method: ``"newton"``, through the network matrix; ``"auto"``: for large batches the closed forms of
+            the limbs, where they have some, of the solution nearest to the guess.
 
     Returns:
         PoseSolution with ``.state .status .residual .iterations`` (..., limbs). Nothing is raised for samples
@@ -188,8 +198,13 @@ def solve_pose(
     base = checked("guess.T_world_base", guess.T_world_base, 4, 4)
     base = base if "base" in wanted else rigid("guess.T_world_base", base)
     q = checked("guess.q", guess.q, len(robot.joints))
-    arrays = wanted | {"guess.T_world_base": base, "guess.q": q}
-    batch = one_batch({name: 2 for name, a in arrays.items() if np.shape(a)[-2:] == (4, 4)}, arrays)
+    named = {f"targets[{name!r}]": (a, _inner(a)) for name, a in wanted.items()}
+    batch = common_batch(named | {"guess.T_world_base": (base, 2), "guess.q": (q, 1)})
     start = State(np.asarray(base, dtype=float), np.asarray(q, dtype=float))
-    auto = method == "auto" and pays("solve_pose", robot, *wanted, count=math.prod(batch))
+    # Newton's method and closed forms may find different solutions: the number of samples alone decides.
+    auto = method == "auto" and math.prod(batch) >= FROM
     return (solve_pose_fast if auto else newton_pose)(robot, wanted, start)
+
+
+def _inner(target: Array) -> int:
+    return 2 if target.shape[-2:] == (4, 4) else 1

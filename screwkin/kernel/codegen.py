@@ -91,7 +91,12 @@ def programs_of(robot: Robot, kinds: Sequence[str]) -> list[Program]:
         if not made:
             lacks = "limb with a closed form" if kind == "ik" else "limb"
             raise InputError(f"{robot.name} has no {lacks}, which {kind} needs")
-        found |= {program.name: program for program in made}
+        for program in made:
+            if found.setdefault(program.name, program) is not program:
+                raise InputError(
+                    f"{robot.name} has two functions {program.name!r}; names of limbs must differ in their "
+                    "letters and digits"
+                )
     if not found:
         raise InputError(f"nothing is asked for; valid: {', '.join(KINDS)}")
     return list(found.values())

@@ -5,8 +5,9 @@ A mechanism is told by its robot and its choice of couplings, which are equal wh
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 from screwkin.kernel.formula import Formula, Tape
-from screwkin.kernel.program import kept
 from screwkin.kernel.records import identifier, pose_input
 from screwkin.mechanism.mechanism import Mechanism, coupling_graph, virtual_chains
 from screwkin.mechanism.network import coupling_twists
@@ -17,7 +18,7 @@ from screwkin.se3 import ZERO, Twist, Vector
 Names = tuple[str, ...]
 
 
-@kept
+@lru_cache(256)
 def mechanism_of(robot: Robot, primary: Names, secondary: Names) -> Mechanism:
     """The mechanism of a robot with a choice that has been checked."""
     chains = virtual_chains(robot)
@@ -50,9 +51,9 @@ def primary_rates(tape: Tape, robot: Robot, primary: Names, secondary: Names, wh
     )
     T, q = pose_input(tape, "T_world_base"), tape.input("q", len(robot.joints))
     twists = {}
-    for chain in imposing_chains(mechanism):
+    for k, chain in enumerate(imposing_chains(mechanism)):
         full = chain.name in whole
-        x = tape.input(identifier("twist", chain.name), 6 if full else 3)
+        x = tape.input(f"twist_{k}", 6 if full else 3)
         twists[chain.name] = Twist(Vector(*x[:3]) if full else ZERO, Vector(*x[-3:]))
     motion = primary_motion(mechanism, T, q, twists)
     tape.output("primary", [motion[name] for name in primary])

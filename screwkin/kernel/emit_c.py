@@ -58,7 +58,7 @@ def _comment(program: Program) -> str:
     text = f"""{program.about}
 In, one after the other for every sample, row by row: {listed(program.inputs)}.
 Out: {listed(program.outputs)}. {program.operations} operations a sample. No two arrays overlap."""
-    lines = [line for part in text.splitlines() for line in textwrap.wrap(part, 110)]
+    lines = [line for part in text.replace("*/", "* /").splitlines() for line in textwrap.wrap(part, 110)]
     return "/* " + "\n   ".join(lines) + " */\n"
 
 

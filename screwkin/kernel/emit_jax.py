@@ -100,10 +100,12 @@ def _last_uses(program: Program) -> list[int]:
     return last
 
 
+@jax.custom_jvp
 def _kept(*arrays: Array) -> tuple[Array, ...]:
     """The arrays, materialised: XLA does not fuse through a condition that is known at run time only.
 
     Other devices wait for the host at every condition; theirs fuse with care and need only a hint.
+    Derivatives pass by: a condition over a batch that ``vmap`` has added has none in reverse.
     """
     if not arrays or not arrays[0].size:
         return arrays
@@ -118,6 +120,11 @@ def _kept(*arrays: Array) -> tuple[Array, ...]:
         return tuple(lax.optimization_barrier(x))
 
     return tuple(lax.platform_dependent(*arrays, cpu=condition, default=hint))
+
+
+@_kept.defjvp
+def _kept_jvp(primals: tuple[Array, ...], tangents: tuple[Array, ...]) -> tuple[Any, Any]:
+    return _kept(*primals), tangents
 
 
 def _row(values: Sequence[Array], result: int | float, batch: tuple[int, ...]) -> Array:

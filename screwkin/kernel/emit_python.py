@@ -39,7 +39,7 @@ def source(program: Program) -> str:
     uses.update(x for x in program.results if isinstance(x, int))
     text: dict[int, str] = {}
     depth: dict[int, int] = {}
-    lines = [f'"""Made by screwkin from a screw table: {program.about}"""', ""]
+    lines = [repr(f"Made by screwkin from a screw table: {program.about}"), ""]
     lines += ["from math import atan2, cos, inf, nan, sin, sqrt", "", ""]
     lines.append(f"def {program.name}({', '.join(group.name for group in program.inputs)}):")
     at = 0

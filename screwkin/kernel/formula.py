@@ -6,8 +6,11 @@ hands out graph scalars and keeps what is done with them; ``Values`` hands out a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import Any, Protocol
+
+import numpy as np
 
 from screwkin.kernel.program import Group, Program, Recorder, kept
 from screwkin.kernel.run import FROM, common_batch, pays, run
@@ -16,6 +19,21 @@ from screwkin.scalar import Scalar, is_jax
 from screwkin.se3 import as_array, leaves, unstack
 
 Array = Any
+
+
+MATRICES = ("T_world_base",)
+"""Inputs of formulas with two axes; all others have one."""
+
+
+def one_batch(told: Mapping[str, Array]) -> tuple[int, ...]:
+    """The batch to which inputs broadcast.
+
+    Raises:
+        ValueError: there is none.
+    """
+    shapes = [array.shape[: array.ndim - (2 if name in MATRICES else 1)] for name, array in told.items()]
+    first = shapes[0]
+    return first if all(shape == first for shape in shapes) else np.broadcast_shapes(*shapes)
 
 
 class Tape(Protocol):
@@ -87,7 +105,7 @@ class Formula:
         By the program, or where it does not pay (``run.pays``) by the formula. Of JAX arrays, which may be
         traced, the number of samples alone decides.
         """
-        count = max(array.size // _row(name, array) for name, array in told.items())
+        count = math.prod(one_batch(told))
         if any(is_jax(array) for array in told.values()):
             if count < FROM:
                 return self.values(robot, *about, told=told)
@@ -97,8 +115,3 @@ class Formula:
         if pays(self, robot, *about, count=count):
             return run(self.program(robot, *about), told)
         return self.values(robot, *about, told=told)
-
-
-def _row(name: str, array: Array) -> int:
-    """Numbers of one sample."""
-    return 16 if name == "T_world_base" else max(array.shape[-1], 1)

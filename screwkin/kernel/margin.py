@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -55,7 +56,7 @@ def support_margin_fast(zmp: Array, soles: Array, contact: Array) -> Array:
     return margin
 
 
-@kept
+@cache
 def support(feet: int, corners: int) -> Program:
     """Signed distance of a point to the border of the convex hull of the soles that bear, -inf if none does.
 

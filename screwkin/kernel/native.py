@@ -14,6 +14,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache, partial
+from importlib.metadata import version
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -152,7 +153,10 @@ def _source(program: Program) -> str:
 @cache
 def emitter() -> str:
     """What the text made of a program depends on besides the program."""
-    text = Path(emit_c.__file__).read_text(encoding="utf-8")
+    try:
+        text = Path(emit_c.__file__).read_text(encoding="utf-8")
+    except OSError:  # installed without sources
+        text = version("screwkin")
     return digest(text, repr((series.SINE, series.COSINE, series.ARC, series.HALF_TURN, series.TURNS)))
 
 

@@ -4,24 +4,48 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from collections.abc import Callable, Hashable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, wraps
 from typing import Any, TypeVar
+from weakref import WeakKeyDictionary
 
 from screwkin.cache import digest
+from screwkin.errors import InputError
 from screwkin.kernel.graph import Graph, Node
 from screwkin.se3 import leaves
 
 Operand = int | float
 T = TypeVar("T")
-KEPT = 256
-"""How many results ``kept`` keeps."""
 
 
 def kept(make: Callable[..., T]) -> Callable[..., T]:
-    """Keep what is made of a robot or a program, but not for all that a search over robots goes through."""
-    return lru_cache(maxsize=KEPT)(make)
+    """Keep what is made of a robot for as long as the robot is there; it must not hold the robot itself."""
+    made: WeakKeyDictionary[Any, dict[Hashable, T]] = WeakKeyDictionary()
+
+    @wraps(make)
+    def found(robot: Any, *about: Hashable) -> T:
+        own = made.get(robot)
+        if own is None:
+            own = made.setdefault(robot, {})
+        if about not in own:
+            own[about] = make(robot, *about)
+        return own[about]
+
+    return found
+
+
+def kept_with(make: Callable[[Program], T]) -> Callable[[Program], T]:
+    """Keep what is made of a program with the program."""
+
+    @wraps(make)
+    def found(program: Program) -> T:
+        if make not in program.memo:
+            program.memo[make] = make(program)
+        kept_value: T = program.memo[make]
+        return kept_value
+
+    return found
 
 
 @dataclass(frozen=True)
@@ -56,6 +80,7 @@ class Program:
         outputs: named arrays.
         steps: operations; step k makes the value ``arity + k``.
         results: the value or number of every output scalar.
+        memo: what has been made of it, as machine code.
     """
 
     name: str
@@ -64,6 +89,7 @@ class Program:
     outputs: tuple[Group, ...]
     steps: tuple[Step, ...]
     results: tuple[Operand, ...]
+    memo: dict[Hashable, Any] = field(default_factory=dict, repr=False)
 
     @property
     def arity(self) -> int:
@@ -104,7 +130,16 @@ class Recorder:
         self.name, self.about = name, about
 
     def input(self, name: str, *shape: int) -> list[Any]:
-        """The scalars of a new input array, flat in row-major order."""
+        """The scalars of a new input array, flat in row-major order.
+
+        Raises:
+            InputError: there is an input of that name.
+        """
+        if any(group.name == name for group in self._inputs):
+            raise InputError(
+                f"{self.name} would have two inputs {name!r}; names of tips must differ in their letters and "
+                "digits"
+            )
         group = Group(name, shape)
         self._inputs.append(group)
         nodes = [self.graph.input(f"{name}[{k}]") for k in range(group.size)]

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Any
 
 import numpy as np
 
-from screwkin.kernel.program import Program, Recorder, kept
+from screwkin.kernel.program import Program, Recorder
 from screwkin.kernel.records import matrix
 from screwkin.kernel.run import chosen_path, python_function, run
 from screwkin.model.state import RIGID, not_rigid
@@ -37,7 +38,7 @@ def nearest_poses(T: Array) -> tuple[Array, Array]:
     return found["deviation"][..., 0], found["pose"]
 
 
-@kept
+@cache
 def poses(exact: bool) -> Program:
     """Largest entry of R^T R - 1 and of the last row's difference from 0 0 0 1; infinite if left-handed.
 

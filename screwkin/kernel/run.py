@@ -9,27 +9,28 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from functools import lru_cache
 from typing import Any, Literal
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from screwkin.kernel import emit_python, native
-from screwkin.kernel.program import KEPT, Group, Program, kept
+from screwkin.kernel.program import Group, Program, kept, kept_with
 from screwkin.model.robot import Robot
+from screwkin.scalar import is_symbolic
+from screwkin.se3 import leaves
 
 Array = Any
 Way = Literal["python", "numpy", "C"]
 
 FROM = 1000
-"""Samples from which a program is made at once; for fewer the formula or algorithm over arrays is quicker."""
+"""Samples of a motion, or of JAX arrays, from which a program is made at once."""
 CALLS = 8
-"""Calls with fewer samples after which a program is made nevertheless: so many take as long as making it."""
+"""Calls after which a program is made: so many take as long. A thousand samples count as one more."""
 PYTHON_UP_TO = 100
 """Samples up to which a loop of generated Python is faster than NumPy's calls."""
-COMPILE_FROM = 10_000
-"""Samples from which a program that was never compiled here is compiled: some seconds, once and for all."""
+COMPILE_AFTER = 10
+"""Samples for every operation after which a program is compiled: some seconds, once on a computer."""
 
 
 def run(
@@ -57,6 +58,8 @@ def run(
     filled = [np.empty((count, group.size)) for group in program.outputs]
     if count:
         _ways(program)[path or chosen_path(program, count)](flat, filled)
+        if count > PYTHON_UP_TO:
+            program.memo[_SAMPLES] = program.memo.get(_SAMPLES, 0) + count
     return {g.name: a.reshape(*batch, *g.shape) for g, a in zip(program.outputs, filled, strict=True)}
 
 
@@ -79,12 +82,14 @@ def _flat(array: Array, batch: tuple[int, ...], count: int, group: Group) -> Arr
 
 
 _asked: WeakKeyDictionary[Robot, Counter[Hashable]] = WeakKeyDictionary()
+_SAMPLES = "samples"
 
 
 def pays(what: Hashable, robot: Robot, *about: Hashable, count: int) -> bool:
-    """True if a program is worth making: for a large batch, or as the robot has been asked before.
+    """True if a program is worth making: for a very large batch, or as the robot has been asked before.
 
-    A search over many robots, each asked once, makes none; a loop over the samples of one robot does.
+    A search over many robots, each asked a few times, makes none; a loop over the samples of one robot does.
+    A robot of symbols has none.
 
     Args:
         what: names the program, with the robot and what else decides it.
@@ -92,14 +97,28 @@ def pays(what: Hashable, robot: Robot, *about: Hashable, count: int) -> bool:
         about: the rest.
         count: samples of this call.
     """
-    calls = _asked.setdefault(robot, Counter())
-    calls[what, about] += 1 if count < FROM else CALLS
-    return calls[what, about] >= CALLS
+    calls = _asked.get(robot)
+    if calls is None:
+        calls = _asked.setdefault(robot, Counter())
+    calls[what, about] += 1 + count // FROM
+    return calls[what, about] >= CALLS and not _is_symbolic(robot)
+
+
+@kept
+def _is_symbolic(robot: Robot) -> bool:
+    records = [x for link in robot.links for x in (link.com, link.inertia, link.frame)]
+    records += [x for joint in robot.joints for x in (joint.screw.s, joint.screw.s0)]
+    records += [limb.frame for limb in robot.limbs]
+    scalars = [leaf for record in records for leaf in leaves(record)]
+    scalars += [link.mass for link in robot.links] + [joint.screw.pitch for joint in robot.joints]
+    return any(map(is_symbolic, scalars))
 
 
 def chosen_path(program: Program, count: int) -> Way:
-    """The path that ``run`` takes for so many samples."""
-    if (count >= COMPILE_FROM or _is_kept(program)) and machine_code(program):
+    """The path that ``run`` takes for so many samples, with those that it was asked for before."""
+    asked = program.memo.get(_SAMPLES, 0) + count
+    worth = count > PYTHON_UP_TO and asked >= COMPILE_AFTER * program.operations
+    if (worth or _is_kept(program)) and machine_code(program):
         return "C"
     return "python" if count <= PYTHON_UP_TO else "numpy"
 
@@ -109,21 +128,22 @@ def large_batches() -> Way:
     return "C" if native.compiler() else "numpy"
 
 
-@kept
+@kept_with
 def machine_code(program: Program) -> native.Native | None:
     """The compiled program, None where that is not possible."""
     made = native.compiled(program)
-    _is_kept.cache_clear()
+    program.memo[_is_kept] = made is not None
     return made
 
 
-@lru_cache(KEPT)
 def _is_kept(program: Program) -> bool:
     """As ``native.is_kept``, asked once: the file system's answer takes longer than a sample."""
-    return native.is_kept(program)
+    if _is_kept not in program.memo:
+        program.memo[_is_kept] = native.is_kept(program)
+    return bool(program.memo[_is_kept])
 
 
-@kept
+@kept_with
 def _ways(program: Program) -> Mapping[str, Callable[[Sequence[Array], Sequence[Array]], None]]:
     def by_numpy(inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
         emit_python.run_numpy(program, inputs, outputs)
@@ -148,7 +168,7 @@ def _ways(program: Program) -> Mapping[str, Callable[[Sequence[Array], Sequence[
     return {"numpy": by_numpy, "python": by_python, "C": by_c}
 
 
-@kept
+@kept_with
 def python_function(program: Program) -> Callable[..., Sequence[list[float]]]:
     """The generated Python function: flat sequences of floats in, a list of floats for every output."""
     names: dict[str, Any] = {}

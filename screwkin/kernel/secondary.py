@@ -32,8 +32,10 @@ from screwkin.solve.limb_rates import Split, pose_rates, split_of
 Array = Any
 
 
-def secondary_rates(mechanism: Mechanism, T_world_base: Array, q: Array, primary: Array) -> Array | None:
-    """As ``solve.rates.secondary_rates``, by a program; None if a sample is singular, or nearly so.
+def secondary_rates(
+    mechanism: Mechanism, T_world_base: Array, q: Array, primary: Array
+) -> tuple[Array, Array] | None:
+    """As ``solve.rates.secondary_rates``, by a program; None if blocks are too large for one.
 
     Args:
         mechanism: the closed mechanism.
@@ -42,21 +44,20 @@ def secondary_rates(mechanism: Mechanism, T_world_base: Array, q: Array, primary
         primary: (B, primary) [rad/s or m/s].
 
     Returns:
-        (B, secondary), samples in doubt by the network matrix.
+        (B, secondary), samples in doubt by the network matrix; and which samples (B,) are singular.
     """
     if not small(mechanism):
         return None
     program = followers(mechanism.robot, mechanism.primary, mechanism.secondary)
     found = run(program, {"T_world_base": T_world_base, "q": q, "primary": primary})
     values, again = found["secondary"], np.flatnonzero(~(found["least"] > RANK_TOLERANCE).all(axis=-1))
+    singular = np.zeros(len(values), dtype=bool)
     if len(again):
         twists = coupling_twists(mechanism, pose_from_array(T_world_base[again]).R, unstack(q[again]))
         N = network_matrix(mechanism, twists, (len(again),))
         solution = rates.secondary_rates(mechanism, N, primary[again])
-        if solution.singular.any():
-            return None
-        values[again] = solution.values
-    return np.asarray(values)
+        values[again], singular[again] = solution.values, solution.singular.any(axis=-1)
+    return np.asarray(values), singular
 
 
 @kept

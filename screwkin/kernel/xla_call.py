@@ -8,6 +8,7 @@ function stands in.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -20,12 +21,12 @@ from jax import lax
 
 from screwkin.cache import digest
 from screwkin.kernel import emit_c, emit_jax, native
-from screwkin.kernel.program import Group, Program, kept
+from screwkin.kernel.program import Group, Program, kept_with
 
 Array = Any
 
 
-@kept
+@kept_with
 def function(program: Program) -> Callable[..., tuple[Array, ...]]:
     """The program as a function of its inputs, arrays (*batch, *shape), to its outputs, likewise.
 
@@ -71,7 +72,7 @@ def run(program: Program, inputs: Mapping[str, Array]) -> dict[str, Array]:
     return {group.name: array for group, array in zip(program.outputs, found, strict=True)}
 
 
-@kept
+@kept_with
 def _jitted(program: Program) -> Callable[..., tuple[Array, ...]]:
     jitted: Callable[..., tuple[Array, ...]] = jax.jit(function(program))
     return jitted
@@ -86,7 +87,7 @@ def _batch_first(program: Program) -> Callable[..., tuple[Array, ...]]:
         batch = jnp.broadcast_shapes(*(x.shape[: x.ndim - n] for x, n in zip(inputs, inner, strict=True)))
         told = []
         for x, group in zip(inputs, program.inputs, strict=True):
-            whole = jnp.broadcast_to(x, (*batch, *group.shape)).reshape(-1, *group.shape)
+            whole = jnp.broadcast_to(x, (*batch, *group.shape)).reshape(math.prod(batch), *group.shape)
             told.append(jnp.moveaxis(whole, 0, -1))
         return tuple(
             jnp.moveaxis(x, -1, 0).reshape(*batch, *group.shape)
@@ -97,7 +98,7 @@ def _batch_first(program: Program) -> Callable[..., tuple[Array, ...]]:
     return compute
 
 
-@kept
+@kept_with
 def _target(program: Program) -> str | None:
     """The program's handler, compiled and told to XLA under a name that its text decides; None without."""
     if not all(group.size for group in (*program.inputs, *program.outputs)):

@@ -65,3 +65,16 @@ def test_gradients_of_a_large_batch_are_those_of_its_samples() -> None:
 
     found = jax.jit(jax.grad(height))(q, T)
     np.testing.assert_allclose(found[:9], jax.jit(jax.grad(height))(q[:9], T[:9]), atol=1e-12)
+
+
+def test_gradients_pass_through_vmap_of_a_large_batch() -> None:
+    T, q, *_ = given(FROM)
+    q = np.stack([q, -q])
+
+    def squares(q):
+        return (jax.vmap(lambda q: sk.center_of_mass(ROBOT, sk.State(T, q)))(q) ** 2).sum()
+
+    found = jax.grad(squares)(jnp.asarray(q))
+    one = jax.grad(lambda q: (sk.center_of_mass(ROBOT, sk.State(T[:9], q)) ** 2).sum())
+    for k in range(2):
+        np.testing.assert_allclose(found[k, :9], one(jnp.asarray(q[k, :9])), atol=1e-12)

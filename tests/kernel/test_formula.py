@@ -98,7 +98,7 @@ def test_a_formula_is_recorded_once_it_pays_and_computes_over_arrays_before() ->
     for _ in range(2 * CALLS):
         ask(first, 1, 2)
     assert told == [Values] * (CALLS - 1) + [Recorder]
-    ask(second, FROM, 2)
+    ask(second, CALLS * FROM, 2)
     ask(second, 1, 2)
     assert told[CALLS:] == [Recorder], "a large batch is worth a program, which small ones then use"
     ask(second, 1, 3)
@@ -106,12 +106,26 @@ def test_a_formula_is_recorded_once_it_pays_and_computes_over_arrays_before() ->
 
 
 def test_a_search_over_robots_keeps_neither_robots_nor_programs() -> None:
-    robot = random_tree(3)
-    sk.link_poses(robot, random_state(robot, 3))
-    gone = weakref.ref(robot)
-    del robot
-    gc.collect()
-    assert gone() is None
+    for calls, count in ((1, 1), (2, 2 * FROM), (CALLS + 1, 1)):
+        robot = random_tree(3)
+        for _ in range(calls):
+            sk.link_poses(robot, random_state(robot, 3, (count,)))
+        gone = weakref.ref(robot)
+        programs = [weakref.ref(body.link_poses.program(robot))]
+        del robot
+        gc.collect()
+        assert gone() is None
+        assert programs[0]() is None
+
+
+def test_a_search_over_robots_makes_no_programs(monkeypatch) -> None:
+    monkeypatch.setattr("screwkin.kernel.formula.Recorder", None)
+    for seed in range(3):
+        robot = random_tree(seed)
+        for _ in range(3):
+            sk.mass_matrix(robot, random_state(robot, seed, (FROM,)))
+    with pytest.raises(TypeError):
+        sk.mass_matrix(robot, random_state(robot, seed, (CALLS * FROM,)))
 
 
 def test_equal_programs_share_a_name_on_disk_and_others_do_not() -> None:
