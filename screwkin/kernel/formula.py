@@ -53,7 +53,7 @@ class Values:
     """A tape of arrays, NumPy or JAX: formulas compute as they are told."""
 
     def __init__(self, told: Mapping[str, Array]) -> None:
-        self._told, self.outputs = told, dict[str, Array]()
+        self._told = told
         self._inputs: list[tuple[Group, Array]] = []
         self._results: list[tuple[Group, Sequence[Scalar]]] = []
 

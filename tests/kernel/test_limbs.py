@@ -20,6 +20,12 @@ from tests.solve.legs import backwards, random_parallel_leg, random_spherical_le
 LEGS = (("bioloid", "left_leg"), ("bioloid", "right_leg"), ("poppy12", "left_leg"), ("poppy12", "right_leg"))
 
 
+@pytest.fixture
+def by_program(monkeypatch):
+    """Makes limb_ik take the program, or the readable algorithms."""
+    return lambda answer: monkeypatch.setattr("screwkin.api.ik.pays", lambda *_, **__: answer)
+
+
 def within_limits(robot, count, seed=0):
     rng = np.random.default_rng(seed)
     low, high = (np.array([getattr(j, k) for j in robot.joints]) for k in ("lower", "upper"))
@@ -27,11 +33,13 @@ def within_limits(robot, count, seed=0):
 
 
 @pytest.mark.parametrize(("name", "limb"), LEGS)
-def test_a_large_batch_has_the_branches_flags_and_order_of_small_ones(name, limb):
+def test_the_program_has_the_branches_flags_and_order_of_the_readable_path(name, limb, by_program):
     robot = sk.load_robot(name)
     T = sk.frame_pose(robot, sk.State(np.eye(4), within_limits(robot, 1200)), robot.limb(limb).tip)
     T[:40, 0, 3] += 2.0  # out of reach
+    by_program(True)
     large = sk.limb_ik(robot, limb, T, least_squares=False)
+    by_program(False)
     parts = [sk.limb_ik(robot, limb, T[i : i + 600], least_squares=False) for i in (0, 600)]
     for field in ("valid", "in_limits"):
         np.testing.assert_array_equal(
@@ -51,14 +59,16 @@ def test_a_large_batch_has_the_branches_flags_and_order_of_small_ones(name, limb
     [random_spherical_leg(11), random_parallel_leg(12), backwards(random_spherical_leg(13), 13)],
     ids=["spherical", "parallel", "backwards"],
 )
-def test_legs_with_any_axes_have_the_solutions_and_flags_of_the_readable_path(leg):
+def test_legs_with_any_axes_have_the_solutions_and_flags_of_the_readable_path(leg, by_program):
     robot = with_leg(leg, 6)
     chain = Chain.of(robot, "left_leg")
     q = np.zeros((1100, 12))
     q[:, list(chain.joints)] = np.random.default_rng(3).uniform(-3, 3, (1100, 6))
     T = sk.frame_pose(robot, sk.State(np.eye(4), q), "left_foot")
     T[:100, :3, 3] += np.random.default_rng(4).normal(size=(100, 3))  # within reach or not
+    by_program(True)
     large = sk.limb_ik(robot, "left_leg", T, least_squares=False)
+    by_program(False)
     small = [sk.limb_ik(robot, "left_leg", T[i : i + 550], least_squares=False) for i in (0, 550)]
     for field in ("valid", "in_limits", "status"):
         told = np.concatenate([getattr(p, field) for p in small])
@@ -70,7 +80,8 @@ def test_legs_with_any_axes_have_the_solutions_and_flags_of_the_readable_path(le
 
 
 @pytest.mark.parametrize("beyond", [-1e-6, 0.0, 1e-10, 1e-8, 1e-6])
-def test_a_joint_at_its_limit_is_inside_to_a_billionth(beyond):
+def test_a_joint_at_its_limit_is_inside_to_a_billionth(beyond, by_program):
+    by_program(True)
     robot = sk.load_robot("bioloid")
     q = np.tile(sk.home(robot).q, (1000, 1))
     joint = robot.joint_names.index("left_hip_roll")

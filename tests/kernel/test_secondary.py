@@ -7,7 +7,7 @@ import pytest
 
 import screwkin as sk
 from screwkin.errors import SingularError
-from screwkin.kernel.run import FROM, run
+from screwkin.kernel.run import CALLS, FROM, run
 from screwkin.kernel.secondary import followers, secondary_rates
 from screwkin.mechanism.choice import RANK_TOLERANCE
 from screwkin.mechanism.network import coupling_twists, network_matrix
@@ -16,6 +16,9 @@ from screwkin.solve import rates
 from tests.kernel.robots import with_leg
 from tests.kinematics.machines import random_state
 from tests.solve.legs import random_parallel_leg, random_spherical_leg
+
+MANY = CALLS * FROM
+"""Samples that are worth a program at once."""
 
 
 def davies(mechanism, state, primary):
@@ -42,7 +45,8 @@ def test_rates_are_those_of_the_network_matrix(name, exchanged):
     state = random_state(robot, 5, (300,))
     primary = np.random.default_rng(6).uniform(-1, 1, (300, len(mechanism.primary)))
     expected = davies(mechanism, state, primary)
-    found = secondary_rates(mechanism, state.T_world_base, state.q, primary)
+    found, singular = secondary_rates(mechanism, state.T_world_base, state.q, primary)
+    assert not singular.any()
     size = np.abs(expected.values).max(axis=1, keepdims=True) / expected.sigma.min(axis=1, keepdims=True)
     assert (np.abs(found - expected.values) <= 1e-12 * np.maximum(size, 1.0)).all()
     told = {"T_world_base": state.T_world_base, "q": state.q, "primary": primary}
@@ -60,7 +64,8 @@ def test_legs_with_any_axes_follow(leg):
     state = random_state(robot, 23, (300,))
     primary = np.random.default_rng(24).uniform(-1, 1, (300, len(mechanism.primary)))
     expected = davies(mechanism, state, primary)
-    found = secondary_rates(mechanism, state.T_world_base, state.q, primary)
+    found, singular = secondary_rates(mechanism, state.T_world_base, state.q, primary)
+    assert not singular.any()
     size = np.abs(expected.values).max(axis=1, keepdims=True) / expected.sigma.min(axis=1, keepdims=True)
     assert (np.abs(found - expected.values) <= 1e-12 * np.maximum(size, 1.0)).all()
 
@@ -68,8 +73,8 @@ def test_legs_with_any_axes_follow(leg):
 def test_large_batches_are_refused_and_marked_as_small_ones_are():
     robot = sk.load_robot("bioloid")
     mechanism = sk.closed_mechanism(robot)
-    state = random_state(robot, 7, (FROM,))
-    primary = np.random.default_rng(8).uniform(-1, 1, (FROM, len(mechanism.primary)))
+    state = random_state(robot, 7, (MANY,))
+    primary = np.random.default_rng(8).uniform(-1, 1, (MANY, len(mechanism.primary)))
     expected = davies(mechanism, state, primary).values
     np.testing.assert_allclose(sk.secondary_rates(mechanism, state, primary), expected, rtol=1e-7, atol=1e-9)
     values, status = sk.secondary_rates(mechanism, state, primary, on_singular="status")
@@ -88,7 +93,7 @@ def test_one_state_serves_many_rates():
     robot = sk.load_robot("poppy12")
     mechanism = sk.closed_mechanism(robot)
     state = random_state(robot, 9, ())
-    primary = np.random.default_rng(10).uniform(-1, 1, (FROM, len(mechanism.primary)))
+    primary = np.random.default_rng(10).uniform(-1, 1, (MANY, len(mechanism.primary)))
     found = sk.secondary_rates(mechanism, state, primary)
     np.testing.assert_allclose(
         found[:5], sk.secondary_rates(mechanism, state, primary[:5]), rtol=1e-9, atol=1e-9
