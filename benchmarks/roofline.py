@@ -86,11 +86,17 @@ def fastest(run: Callable[[], object], rounds: int = 15) -> float:
     return statistics.median(times)
 
 
-def peak() -> float:
-    """Operations per second of one core: multiply-adds count two."""
+def _loop(name: str) -> Any:
+    """One of ``LOOPS``, compiled."""
+    from screwkin.cache import digest
     from screwkin.kernel.native import shared
 
-    loop = shared(LOOPS, "multiply_add", VECTORS)
+    return shared(digest(LOOPS), lambda: LOOPS, name, VECTORS)
+
+
+def peak() -> float:
+    """Operations per second of one core: multiply-adds count two."""
+    loop = _loop("multiply_add")
     x = np.ones(LANES)
     loop.argtypes = [ctypes.c_size_t, ctypes.c_void_p]
     return 2 * LANES * STEPS / fastest(lambda: loop(STEPS, x.ctypes.data))
@@ -98,9 +104,7 @@ def peak() -> float:
 
 def bandwidth(count: int) -> float:
     """Bytes per second, read and written, of copying as many doubles."""
-    from screwkin.kernel.native import shared
-
-    loop = shared(LOOPS, "copy", VECTORS)
+    loop = _loop("copy")
     a, b = np.ones(count), np.ones(count)
     loop.argtypes = [ctypes.c_size_t, ctypes.c_void_p, ctypes.c_void_p]
     return 16 * count / fastest(lambda: loop(count, a.ctypes.data, b.ctypes.data))
