@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from screwkin.analysis.validate import Validation
 from screwkin.report.account import Account
+
+if TYPE_CHECKING:  # it brings the simulator, which a walk does without
+    from screwkin.analysis.validate import Validation
 
 
 class Number(NamedTuple):
