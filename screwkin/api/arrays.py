@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from screwkin.errors import ShapeError
-from screwkin.kernel.formula import MATRICES
+from screwkin.kernel.formula import axes
 from screwkin.kernel.rigid import foreign
+from screwkin.kernel.run import common_batch
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 from screwkin.scalar import is_jax
@@ -78,7 +79,7 @@ def told(robot: Robot, state: State, more: Mapping[str, Told] | None = None) -> 
     names = {"T_world_base": "state.T_world_base", "q": "state.q"}
     for key, (name, value, size) in (more or {}).items():
         found[key], names[key] = checked(name, value, size), name
-    common_batch({names[key]: (a, 2 if key in MATRICES else 1) for key, a in found.items()})
+    one_batch({names[key]: (a, axes(key)) for key, a in found.items()})
     rigid("state.T_world_base", found["T_world_base"])
     return found
 
@@ -88,15 +89,15 @@ def or_rest(twist: Any) -> Any:
     return np.zeros(6) if twist is None else twist
 
 
-def common_batch(arrays: Mapping[str, tuple[Array, int]]) -> tuple[int, ...]:
+def one_batch(arrays: Mapping[str, tuple[Array, int]]) -> tuple[int, ...]:
     """The batch to which arrays broadcast; each by its name for messages, with its number of other axes.
 
     Raises:
         ShapeError: there is none.
     """
-    batches = {name: a.shape[: a.ndim - inner] for name, (a, inner) in arrays.items()}
     try:
-        return np.broadcast_shapes(*batches.values())
+        return common_batch(*zip(*arrays.values(), strict=True))
     except ValueError:
+        batches = {name: a.shape[: a.ndim - inner] for name, (a, inner) in arrays.items()}
         each = " and of ".join(f"{name} {batch}" for name, batch in batches.items() if batch)
         raise ShapeError(f"batch of {each} do not broadcast") from None

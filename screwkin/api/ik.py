@@ -6,8 +6,8 @@ from typing import Any, get_args
 
 import numpy as np
 
-from screwkin.api.arrays import Array, checked
-from screwkin.errors import InputError, ShapeError
+from screwkin.api.arrays import Array, checked, one_batch
+from screwkin.errors import InputError
 from screwkin.kernel.branches import limb_solutions
 from screwkin.kernel.limbs import solvable
 from screwkin.kernel.rigid import nearest_poses
@@ -65,12 +65,7 @@ def limb_ik(
     around = 2 if poses else 1
     start = _default_guess(robot, chain) if guess is None else guess
     start = np.asarray(checked("guess", start, len(chain.names)), dtype=float)
-    try:
-        batch = np.broadcast_shapes(target.shape[:-around], start.shape[:-1])
-    except ValueError:
-        raise ShapeError(
-            f"batch of T_base_tip {target.shape[:-around]} and of guess {start.shape[:-1]} do not broadcast"
-        ) from None
+    batch = one_batch({"T_base_tip": (target, around), "guess": (start, 1)})
     count = int(np.prod(batch))
     shape = target.shape[target.ndim - around :]
     flat = np.broadcast_to(target, (*batch, *shape)).reshape(count, *shape)

@@ -8,12 +8,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from screwkin.api.arrays import Array, Told, checked, common_batch, rigid, told
+from screwkin.api.arrays import Array, Told, checked, one_batch, rigid, told
 from screwkin.api.body import home
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.kernel import davies
-from screwkin.kernel.pose import solve_pose_fast
-from screwkin.kernel.run import FROM, pays
+from screwkin.kernel.pose import axes_of, solve_samples
+from screwkin.kernel.run import pays
 from screwkin.kernel.secondary import secondary_rates as kernel_rates
 from screwkin.mechanism import network
 from screwkin.mechanism import virtual_motion as virtual
@@ -137,7 +137,7 @@ def _by_program(mechanism: Mechanism, state: State, primary: Array) -> tuple[Arr
     T, q = arrays["T_world_base"], arrays["q"]
     if any(map(is_jax, (T, q, primary))):
         return None
-    batch = common_batch({"state.T_world_base": (T, 2), "state.q": (q, 1), "primary_rates": (primary, 1)})
+    batch = one_batch({"state.T_world_base": (T, 2), "state.q": (q, 1), "primary_rates": (primary, 1)})
     choice = mechanism.primary, mechanism.secondary
     if not pays("secondary_rates", mechanism.robot, *choice, count=math.prod(batch)):
         return None
@@ -198,13 +198,7 @@ def solve_pose(
     base = checked("guess.T_world_base", guess.T_world_base, 4, 4)
     base = base if "base" in wanted else rigid("guess.T_world_base", base)
     q = checked("guess.q", guess.q, len(robot.joints))
-    named = {f"targets[{name!r}]": (a, _inner(a)) for name, a in wanted.items()}
-    batch = common_batch(named | {"guess.T_world_base": (base, 2), "guess.q": (q, 1)})
+    named = {f"targets[{name!r}]": (a, axes_of(a)) for name, a in wanted.items()}
+    one_batch(named | {"guess.T_world_base": (base, 2), "guess.q": (q, 1)})
     start = State(np.asarray(base, dtype=float), np.asarray(q, dtype=float))
-    # Newton's method and closed forms may find different solutions: the number of samples alone decides.
-    auto = method == "auto" and math.prod(batch) >= FROM
-    return (solve_pose_fast if auto else newton_pose)(robot, wanted, start)
-
-
-def _inner(target: Array) -> int:
-    return 2 if target.shape[-2:] == (4, 4) else 1
+    return (solve_samples if method == "auto" else newton_pose)(robot, wanted, start)

@@ -6,6 +6,7 @@ Every one is the public function of the same name, or a part of it, without its 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 from screwkin.dynamics import newton_euler
 from screwkin.dynamics.newton_euler import GRAVITY, Bodies
@@ -152,6 +153,13 @@ def _motion(tape: Tape, robot: Robot) -> tuple[list[Scalar], list[Scalar], Twist
     return qd, qdd, twist_input(tape, "base_twist"), twist_input(tape, "base_acceleration")
 
 
+def _dynamics(tape: Tape, robot: Robot) -> tuple[Pose, tuple[Any, ...]]:
+    """Base pose, and what the functions of ``newton_euler`` are told of bodies that move under gravity."""
+    T, q = _state(tape, robot)
+    moving = _motion(tape, robot)
+    return T, (Bodies.of(robot, T.R, q), *moving, *tape.input("gravity", 1))
+
+
 @Formula
 def inverse_dynamics(tape: Tape, robot: Robot) -> None:
     """Wrench on the base about its origin, and torques of the joints."""
@@ -159,9 +167,8 @@ def inverse_dynamics(tape: Tape, robot: Robot) -> None:
         identifier(robot.name, "inverse_dynamics"),
         f"Wrench [m; f] on the base of {robot.name} about its origin, world axes, and efforts of the joints.",
     )
-    T, q = _state(tape, robot)
-    moving, (gravity,) = _motion(tape, robot), tape.input("gravity", 1)
-    wrench, torques = newton_euler.inverse_dynamics(Bodies.of(robot, T.R, q), *moving, gravity)
+    _, dynamics = _dynamics(tape, robot)
+    wrench, torques = newton_euler.inverse_dynamics(*dynamics)
     tape.output("force", [*wrench.m, *wrench.f, *torques])
 
 
@@ -172,9 +179,8 @@ def ground_wrench(tape: Tape, robot: Robot) -> None:
         identifier(robot.name, "ground_wrench"),
         f"Wrench [m; f] that the ground gives {robot.name}, about the world origin, world axes.",
     )
-    T, q = _state(tape, robot)
-    moving, (gravity,) = _motion(tape, robot), tape.input("gravity", 1)
-    wrench = wrench_at(-T.p, newton_euler.ground_wrench(Bodies.of(robot, T.R, q), *moving, gravity))
+    T, dynamics = _dynamics(tape, robot)
+    wrench = wrench_at(-T.p, newton_euler.ground_wrench(*dynamics))
     tape.output("wrench", [*wrench.m, *wrench.f])
 
 

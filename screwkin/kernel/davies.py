@@ -5,8 +5,6 @@ A mechanism is told by its robot and its choice of couplings, which are equal wh
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 from screwkin.kernel.formula import Formula, Tape
 from screwkin.kernel.records import identifier, pose_input
 from screwkin.mechanism.mechanism import Mechanism, coupling_graph, virtual_chains
@@ -18,7 +16,6 @@ from screwkin.se3 import ZERO, Twist, Vector
 Names = tuple[str, ...]
 
 
-@lru_cache(256)
 def mechanism_of(robot: Robot, primary: Names, secondary: Names) -> Mechanism:
     """The mechanism of a robot with a choice that has been checked."""
     chains = virtual_chains(robot)

@@ -10,8 +10,6 @@ import math
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from typing import Any, Protocol
 
-import numpy as np
-
 from screwkin.kernel.program import Group, Program, Recorder, kept
 from screwkin.kernel.run import FROM, common_batch, pays, run
 from screwkin.model.robot import Robot
@@ -21,19 +19,9 @@ from screwkin.se3 import as_array, leaves, unstack
 Array = Any
 
 
-MATRICES = ("T_world_base",)
-"""Inputs of formulas with two axes; all others have one."""
-
-
-def one_batch(told: Mapping[str, Array]) -> tuple[int, ...]:
-    """The batch to which inputs broadcast.
-
-    Raises:
-        ValueError: there is none.
-    """
-    shapes = [array.shape[: array.ndim - (2 if name in MATRICES else 1)] for name, array in told.items()]
-    first = shapes[0]
-    return first if all(shape == first for shape in shapes) else np.broadcast_shapes(*shapes)
+def axes(name: str) -> int:
+    """Axes of a formula's input behind its batch: a pose has two, all others one."""
+    return 2 if name == "T_world_base" else 1
 
 
 class Tape(Protocol):
@@ -75,7 +63,7 @@ class Values:
     def arrays(self) -> dict[str, Array]:
         """Every output (*batch, *shape)."""
         groups, told = zip(*self._inputs, strict=True)
-        batch = common_batch(told, groups)
+        batch = common_batch(told, [len(group.shape) for group in groups])
         return {
             group.name: as_array(flat, batch).reshape(*batch, *group.shape) for group, flat in self._results
         }
@@ -105,7 +93,7 @@ class Formula:
         By the program, or where it does not pay (``run.pays``) by the formula. Of JAX arrays, which may be
         traced, the number of samples alone decides.
         """
-        count = math.prod(one_batch(told))
+        count = math.prod(common_batch(told.values(), map(axes, told)))
         if any(is_jax(array) for array in told.values()):
             if count < FROM:
                 return self.values(robot, *about, told=told)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from screwkin.kernel import limbs
 from screwkin.kernel.records import identifier
-from screwkin.kernel.run import FROM, run
+from screwkin.kernel.run import FROM, common_batch, run
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 from screwkin.solve.chain import Chain
@@ -54,18 +55,19 @@ def solve_pose_fast(robot: Robot, targets: Mapping[str, Array], guess: State) ->
     if not open_.any():
         return solution
     again = np.flatnonzero(open_.any(axis=-1))
-    picked = {name: _picked(x, batch, again, _inner(x)) for name, x in targets.items()}
+    picked = {name: _picked(x, batch, again, axes_of(x)) for name, x in targets.items()}
     rest = State(_picked(guess.T_world_base, batch, again, 2), _picked(guess.q, batch, again, 1))
     return solution.replaced(again, solve_pose(robot, picked, rest))
 
 
 def solve_samples(robot: Robot, targets: Mapping[str, Array], guess: State) -> PoseSolution:
-    """The same for the samples (T,) of a motion: by closed forms if there are many, else by Newton's method.
+    """The same, by closed forms if there are many samples, else by Newton's method.
 
-    How many samples there are decides alone, so that a motion is the same whenever it is made.
+    These may find different solutions: how many samples there are decides alone, not what was asked before.
     """
-    many = len(guess.T_world_base) >= FROM
-    return (solve_pose_fast if many else solve_pose)(robot, targets, guess)
+    arrays = [guess.T_world_base, guess.q, *targets.values()]
+    count = math.prod(common_batch(arrays, [2, 1, *map(axes_of, targets.values())]))
+    return (solve_pose_fast if count >= FROM else solve_pose)(robot, targets, guess)
 
 
 def _unwind(robot: Robot, tips: Sequence[str], found: dict[str, Array], guess: Array) -> None:
@@ -85,7 +87,8 @@ def _unwind(robot: Robot, tips: Sequence[str], found: dict[str, Array], guess: A
         found["worst"].reshape(-1, len(tips))[rows, k] = np.array(chain.joints)[excess.argmax(axis=1)]
 
 
-def _inner(target: Array) -> int:
+def axes_of(target: Array) -> int:
+    """Axes of a target behind its batch: a pose (4, 4) has two, a position (3,) one."""
     return 2 if np.shape(target)[-2:] == (4, 4) else 1
 
 

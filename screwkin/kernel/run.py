@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Hashable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from typing import Any, Literal
 from weakref import WeakKeyDictionary
 
@@ -52,7 +52,7 @@ def run(
     """
     arrays = [np.asarray(inputs[group.name], dtype=float) for group in program.inputs]
     if batch is None:
-        batch = common_batch(arrays, program.inputs)
+        batch = common_batch(arrays, [len(group.shape) for group in program.inputs])
     count = math.prod(batch)
     flat = [_flat(a, batch, count, g) for a, g in zip(arrays, program.inputs, strict=True)]
     filled = [np.empty((count, group.size)) for group in program.outputs]
@@ -63,13 +63,13 @@ def run(
     return {g.name: a.reshape(*batch, *g.shape) for g, a in zip(program.outputs, filled, strict=True)}
 
 
-def common_batch(arrays: Sequence[Any], groups: Sequence[Group]) -> tuple[int, ...]:
-    """The shape to which what stands in front of the groups' shapes broadcasts.
+def common_batch(arrays: Iterable[Any], inner: Iterable[int]) -> tuple[int, ...]:
+    """The shape to which the batches of arrays broadcast, each in front of so many inner axes.
 
     Raises:
         ValueError: there is none.
     """
-    first, *others = [a.shape[: a.ndim - len(g.shape)] for a, g in zip(arrays, groups, strict=True)]
+    first, *others = [a.shape[: a.ndim - axes] for a, axes in zip(arrays, inner, strict=True)]
     return first if all(shape == first for shape in others) else np.broadcast_shapes(first, *others)
 
 
