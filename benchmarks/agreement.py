@@ -9,8 +9,8 @@ import numpy as np
 import screwkin as sk
 from benchmarks.contest import Result
 from benchmarks.workloads import Reach, Stance
+from screwkin.kinematics.serial_chain import distance
 from screwkin.model.robot import Robot
-from screwkin.solve.chain import distance
 
 SAME = 1e-9
 """Largest relative difference of results that are computed directly; the conditions are below 1e4."""

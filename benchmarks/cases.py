@@ -13,8 +13,8 @@ import screwkin as sk
 from benchmarks import agreement, ours, workloads
 from benchmarks.contest import Contestants, Result
 from benchmarks.peers import apart, mujoco, pinocchio_contest, pinocchio_python
+from screwkin.kinematics.serial_chain import Chain
 from screwkin.model.robot import Robot
-from screwkin.solve.chain import Chain
 
 Provider = Callable[[], Contestants]
 Provide = Callable[[Robot, Any], Contestants]

@@ -24,12 +24,13 @@ from benchmarks import workloads
 from benchmarks.environments import ROOT
 from benchmarks.machine import description, version_of
 from benchmarks.report import time_told
-from screwkin.kernel import body, limbs
-from screwkin.kernel.motion import motion
-from screwkin.kernel.pose import closed_targets
-from screwkin.kernel.program import Program
-from screwkin.kernel.records import identifier
-from screwkin.kernel.run import run
+from screwkin.compiler.program import Program
+from screwkin.compiler.records import identifier
+from screwkin.compiler.run import run
+from screwkin.dynamics import body
+from screwkin.ik import programs as limbs
+from screwkin.ik.whole_body import closed_targets
+from screwkin.mechanism.tip_motion import motion
 from screwkin.model.robot import Robot
 
 Array = Any
@@ -94,7 +95,7 @@ def measured(
     import jax
     from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
-    from screwkin.kernel.emit_jax import function
+    from screwkin.compiler.emit_jax import function
 
     count = len(next(iter(given.values())))
     mesh = Mesh(np.array(devices), ("batch",))

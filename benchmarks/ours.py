@@ -12,15 +12,16 @@ import screwkin as sk
 from benchmarks.contest import Contestant, Contestants, Result
 from benchmarks.workloads import Dynamic, Motion, Reach, Stance
 from screwkin.analysis.workspace import workspace
+from screwkin.compiler.emit_python import run_numpy
+from screwkin.compiler.native import THREADED_FROM
+from screwkin.compiler.program import Program
+from screwkin.compiler.records import identifier
+from screwkin.compiler.run import machine_code, python_function
+from screwkin.compiler.run import run as kernel
+from screwkin.dynamics import body
 from screwkin.gait.balance import ground_reaction
-from screwkin.kernel import body, limbs
-from screwkin.kernel.emit_python import run_numpy
-from screwkin.kernel.motion import motion
-from screwkin.kernel.native import THREADED_FROM
-from screwkin.kernel.program import Program
-from screwkin.kernel.records import identifier
-from screwkin.kernel.run import CALLS, machine_code, python_function
-from screwkin.kernel.run import run as kernel
+from screwkin.ik import programs as limbs
+from screwkin.mechanism.tip_motion import motion
 from screwkin.model.robot import Robot
 
 Array = Any
@@ -46,7 +47,7 @@ def rates(robot: Robot, given: Motion) -> Contestants:
 
 def _warm(run: Callable[[], T]) -> Callable[[], T]:
     """Called so often that small batches are computed by programs, too."""
-    for _ in range(CALLS):
+    for _ in range(2):
         run()
     return run
 
@@ -81,7 +82,7 @@ def _rate_kernels(robot: Robot, given: Motion) -> Contestants:
         contestants[f"{NAME}, generated Python"] = Contestant(lambda: function(*sample), told_once)
         return contestants
     contestants[f"{NAME}, NumPy kernel"] = Contestant(lambda: run_numpy(program, flat, filled), result)
-    from screwkin.kernel import emit_jax, xla_call
+    from screwkin.compiler import emit_jax, xla_call
 
     fused, called = (
         _jax(program, flat, made, first)

@@ -89,7 +89,7 @@ def fastest(run: Callable[[], object], rounds: int = 15) -> float:
 def _loop(name: str) -> Any:
     """One of ``LOOPS``, compiled."""
     from screwkin.cache import digest
-    from screwkin.kernel.native import shared
+    from screwkin.compiler.native import shared
 
     return shared(digest(LOOPS), lambda: LOOPS, name, VECTORS)
 
@@ -112,9 +112,10 @@ def bandwidth(count: int) -> float:
 
 def bounds(robot: Any) -> list[Bound]:
     """The kernels of rates, balance and inverse kinematics."""
-    from screwkin.kernel import body, limbs
-    from screwkin.kernel.motion import motion
-    from screwkin.kernel.run import machine_code
+    from screwkin.compiler.run import machine_code
+    from screwkin.dynamics import body
+    from screwkin.ik import programs as limbs
+    from screwkin.mechanism.tip_motion import motion
 
     limb = next(limb.name for limb in robot.limbs if limb.kind == "leg")
     programs = [
@@ -164,7 +165,7 @@ def main(arguments: list[str] | None = None) -> int:
     asked = parser.parse_args(arguments)
     pin_threads()
     import screwkin as sk
-    from screwkin.kernel.native import compiler
+    from screwkin.compiler.native import compiler
 
     if compiler() is None:
         print("no C compiler here: there is no machine code to measure", file=sys.stderr)

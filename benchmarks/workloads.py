@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 
 import screwkin as sk
 from screwkin.analysis.ik_targets import random_targets, walking_path, walking_targets
+from screwkin.kinematics.serial_chain import Chain
 from screwkin.model.robot import Limb, Robot
-from screwkin.solve.chain import Chain
 
 Array = Any
 

@@ -8,7 +8,7 @@ the waist follows.
 import numpy as np
 
 import screwkin as sk
-from screwkin.solve.closure import close_loops
+from screwkin.mechanism.closure import close_loops
 
 
 def main() -> float:

@@ -9,7 +9,7 @@ import numpy as np
 import screwkin as sk
 from screwkin.gait.plan import plan
 from screwkin.gait.walk import stance_of
-from screwkin.solve.integrate import integrate_rates
+from screwkin.mechanism.integrate import integrate_rates
 
 STEP = 0.02  # integration step [s]
 

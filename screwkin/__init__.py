@@ -7,54 +7,55 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from screwkin.analysis.validate import Validation, validate
-    from screwkin.api.body import (
+    from screwkin.dynamics.quantities import (
         center_of_mass,
         com_jacobian,
         frame_pose,
         ground_wrench,
-        home,
         inverse_dynamics,
         jacobian,
         link_poses,
         mass_matrix,
         momentum,
     )
-    from screwkin.api.ik import limb_ik
-    from screwkin.api.mechanism import network_matrix, secondary_rates, solve_pose, virtual_motion
     from screwkin.errors import ScrewkinError
     from screwkin.gait.balance import Balance, zmp
     from screwkin.gait.files import load_gait
     from screwkin.gait.record import Gait
     from screwkin.gait.walk import walk
+    from screwkin.ik.limb import limb_ik
+    from screwkin.ik.pose import solve_pose
     from screwkin.mechanism.choice import closed_mechanism
+    from screwkin.mechanism.closure import close_loops
     from screwkin.mechanism.mechanism import Mechanism
+    from screwkin.mechanism.quantities import network_matrix, secondary_rates, virtual_motion
+    from screwkin.mechanism.singularity import singularity_report
     from screwkin.model.robot import Robot
-    from screwkin.model.state import State
+    from screwkin.model.state import State, home
     from screwkin.model.table import load_robot
-    from screwkin.solve.closure import close_loops
-    from screwkin.solve.singularity import singularity_report
     from screwkin.trajectory import Trajectory, load_trajectory
 
 _HOMES = {
     "analysis.validate": "Validation validate",
-    "api.body": (
-        "center_of_mass com_jacobian frame_pose ground_wrench home inverse_dynamics jacobian link_poses"
+    "dynamics.quantities": (
+        "center_of_mass com_jacobian frame_pose ground_wrench inverse_dynamics jacobian link_poses"
         " mass_matrix momentum"
     ),
-    "api.ik": "limb_ik",
-    "api.mechanism": "network_matrix secondary_rates solve_pose virtual_motion",
     "errors": "ScrewkinError",
     "gait.balance": "Balance zmp",
     "gait.files": "load_gait",
     "gait.record": "Gait",
     "gait.walk": "walk",
+    "ik.limb": "limb_ik",
+    "ik.pose": "solve_pose",
     "mechanism.choice": "closed_mechanism",
+    "mechanism.closure": "close_loops",
     "mechanism.mechanism": "Mechanism",
+    "mechanism.quantities": "network_matrix secondary_rates virtual_motion",
+    "mechanism.singularity": "singularity_report",
     "model.robot": "Robot",
-    "model.state": "State",
+    "model.state": "State home",
     "model.table": "load_robot",
-    "solve.closure": "close_loops",
-    "solve.singularity": "singularity_report",
     "trajectory": "Trajectory load_trajectory",
 }
 _HOME_OF = {name: f"screwkin.{module}" for module, names in _HOMES.items() for name in names.split()}

@@ -18,12 +18,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import as_array, rotation_exp, rotation_from_array, rotation_log
 from screwkin.errors import InputError, TrajectoryError
 from screwkin.files import atomic_write, atomic_write_bytes, npz_bytes, read_npz
 from screwkin.model.state import not_rigid
-from screwkin.se3 import as_array, rotation_exp, rotation_from_array, rotation_log
-
-Array = NDArray[np.float64]
 
 TIP_PREFIX = "T_world_"
 _SHAPES: Mapping[str, tuple[str, ...]] = {

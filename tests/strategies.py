@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from screwkin.screw import INFINITE, Screw, Wrench
-from screwkin.se3 import Twist, Vector, as_array, exp, leaves
+from screwkin.algebra.screws import INFINITE, Screw, Wrench
+from screwkin.algebra.se3 import Twist, Vector, as_array, exp, leaves
 
 EPS = float(np.finfo(float).eps)
 

@@ -21,14 +21,17 @@ import screwkin
 
 CHECKOUT = Path(__file__).resolve().parent.parent
 FLOORS: dict[str, int] = {
-    "errors": 0, "files": 0, "cache": 0, "scalar": 0, "se3": 0, "screw": 0,
-    "model": 1,
-    "kinematics": 2, "mechanism": 2,
-    "solve": 3, "dynamics": 3, "kernel": 3,
-    "gait": 4, "trajectory": 4,
-    "sim": 5, "servo": 5,
-    "analysis": 6, "report": 6,
-    "api": 7, "cli": 7, "__main__": 7, "": 7,
+    "errors": 0, "files": 0, "cache": 0, "algebra": 0,
+    "compiler": 1,
+    "model": 2,
+    "kinematics": 3,
+    "dynamics": 4, "mechanism": 4,
+    "ik": 5, "compliance": 5,
+    "gait": 6, "trajectory": 6,
+    "sim": 7, "servo": 7,
+    "analysis": 8,
+    "report": 9, "papers": 9, "export": 9,
+    "cli": 10, "__main__": 10, "": 10,
 }  # fmt: skip
 DRIVERS = {
     "pybullet": "screwkin.sim.pybullet",
@@ -104,7 +107,7 @@ def imports_of(tree: ast.Module, module: str, is_package: bool) -> Iterator[Impo
 
 
 def owner(target: str, known: set[str]) -> str | None:
-    """The module of the package that an import reaches: ``screwkin.screw.Screw`` is ``screwkin.screw``."""
+    """The module of the package that an import reaches: ``screwkin.errors.Fault`` is ``screwkin.errors``."""
     while target and target not in known:
         target = target.rpartition(".")[0]
     return target or None
@@ -152,6 +155,24 @@ def cycles(sources: list[Module]) -> list[str]:
         if start in reached:
             found.append(f"{start} imports itself through {sorted(n for n in reached if start in edges[n])}")
     return found
+
+
+def mutual(sources: list[Module]) -> list[str]:
+    """Pairs of packages that import each other."""
+    known = {m.name for m in sources}
+    way: dict[str, dict[str, str]] = {}
+    for m in sources:
+        for used in m.imports:
+            target = owner(used.target, known)
+            here, there = (name.split(".")[1] if "." in name else "" for name in (m.name, target or ""))
+            if here != there and here and there:
+                way.setdefault(here, {})[there] = f"{m.name}:{used.line}"
+    return [
+        f"{a} and {b} import each other: {way[a][b]}, {way[b][a]}"
+        for a in way
+        for b in way[a]
+        if a < b and a in way.get(b, {})
+    ]
 
 
 def misplaced_drivers(sources: list[Module]) -> list[str]:
@@ -213,7 +234,7 @@ def unfinished(sources: list[Module]) -> list[str]:
 
 
 PACKAGE = modules(CHECKOUT / "screwkin")
-RULES = (unplaced, upward, cycles, misplaced_drivers, eager, long_files, long_functions, unfinished)
+RULES = (unplaced, upward, cycles, mutual, misplaced_drivers, eager, long_files, long_functions, unfinished)
 
 
 @pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)
@@ -277,32 +298,41 @@ LONG_FUNCTION = "def f():\n" + "    x = 1\n" * 60
 BAD_TREES = [
     ("unplaced", {"utils.py": ""}),
     ("unplaced", {"helpers/deep/file.py": ""}),
-    ("upward", {"screw.py": "from screwkin.model import robot\n", "model/robot.py": ""}),
-    ("upward", {"screw.py": "from screwkin.model.robot import Robot\n", "model/robot.py": ""}),
+    ("upward", {"algebra/screws.py": "from screwkin.model import robot\n", "model/robot.py": ""}),
+    ("upward", {"algebra/screws.py": "from screwkin.model.robot import Robot\n", "model/robot.py": ""}),
     (
         "upward",
-        {"model/robot.py": "def f():\n    import screwkin.solve.newton as n\n", "solve/newton.py": ""},
+        {"model/robot.py": "def f():\n    import screwkin.ik.newton as n\n", "ik/newton.py": ""},
     ),
     (
         "upward",
-        {"model/robot.py": "from ..solve import newton\n", "model/__init__.py": "", "solve/newton.py": ""},
+        {"model/robot.py": "from ..ik import newton\n", "model/__init__.py": "", "ik/newton.py": ""},
     ),
-    ("upward", {"model/__init__.py": "from ..solve.newton import x\n", "solve/newton.py": ""}),
+    ("upward", {"model/__init__.py": "from ..ik.newton import x\n", "ik/newton.py": ""}),
     (
         "upward",
         {"sim/b.py": "if TYPE_CHECKING:\n    from screwkin.report import page\n", "report/page.py": ""},
     ),
-    ("upward", {"errors.py": "import importlib\nimportlib.import_module('screwkin.api')\n", "api.py": ""}),
+    ("upward", {"errors.py": "import importlib\nimportlib.import_module('screwkin.cli')\n", "cli.py": ""}),
     ("upward", {"errors.py": "import screwkin\n", "__init__.py": ""}),
     ("cycles", {"model/a.py": "from screwkin.model import b\n", "model/b.py": "from . import a\n"}),
+    (
+        "mutual",
+        {
+            "sim/a.py": "from screwkin.servo import b\n",
+            "servo/b.py": "",
+            "servo/c.py": "from screwkin.sim import d\n",
+            "sim/d.py": "",
+        },
+    ),
     ("misplaced_drivers", {"sim/other.py": "def f():\n    import pybullet\n"}),
     ("misplaced_drivers", {"servo/packets.py": "def f():\n    from serial.tools import list_ports\n"}),
     ("misplaced_drivers", {"sim/pybullet.py": "def f():\n    import dynamixel_sdk\n"}),
     ("eager", {"sim/pybullet.py": "import pybullet\n"}),
     ("eager", {"report/symbols.py": "class A:\n    from sympy import Symbol\n"}),
-    ("long_files", {"screw.py": "\n" * 401}),
-    ("long_functions", {"screw.py": LONG_FUNCTION}),
-    ("unfinished", {"screw.py": "# TO" + "DO: later\n"}),
+    ("long_files", {"algebra/screws.py": "\n" * 401}),
+    ("long_functions", {"algebra/screws.py": LONG_FUNCTION}),
+    ("unfinished", {"algebra/screws.py": "# TO" + "DO: later\n"}),
 ]
 
 
@@ -314,15 +344,15 @@ def test_every_rule_sees_a_tree_that_breaks_it(tmp_path, name, files):
 
 def test_a_sound_tree_has_no_faults(tmp_path):
     files = {
-        "__init__.py": "def f():\n    from screwkin import api\n",
-        "api.py": "from screwkin.sim.pybullet import connect\nfrom screwkin.model import robot\n",
+        "__init__.py": "def f():\n    from screwkin import cli\n",
+        "cli.py": "from screwkin.sim.pybullet import connect\nfrom screwkin.model import robot\n",
         "sim/pybullet.py": "if TYPE_CHECKING:\n    import sympy\ndef connect():\n    import pybullet\n",
         "servo/bus.py": "class Bus:\n    def __init__(self):\n        import serial, dynamixel_sdk\n",
         "model/__init__.py": "",
-        "model/robot.py": "from ..screw import Screw\nimport numpy\n",
+        "model/robot.py": "from ..algebra.screws import Screw\nimport numpy\n",
         "mechanism/graph.py": "from screwkin.kinematics.positions import link_displacements\n",
         "kinematics/positions.py": "",
-        "screw.py": "def sympy_free(): pass\n",
+        "algebra/screws.py": "def sympy_free(): pass\n",
     }
     sources = plant(tmp_path, files)
     assert [fault for rule in RULES for fault in rule(sources)] == []

@@ -12,9 +12,9 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial.transform import Rotation as ScipyRotation
 
-from screwkin import se3
-from screwkin.screw import Wrench, at, power, transport, transport_wrench, wrench_at
-from screwkin.se3 import Twist, Vector, as_array
+from screwkin.algebra import se3
+from screwkin.algebra.screws import Wrench, at, power, transport, transport_wrench, wrench_at
+from screwkin.algebra.se3 import Twist, Vector, as_array
 from tests.strategies import assert_close
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from screwkin.scalar import minus, over, times
+from screwkin.algebra.scalar import minus, over, times
 
 Scalar = Any
 Pivots = list[tuple[int, int]]

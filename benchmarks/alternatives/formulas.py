@@ -9,10 +9,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from screwkin.algebra.screws import Screw, at, displacement, transport
+from screwkin.algebra.se3 import IDENTITY, UNTURNED, Pose, Twist, Vector, cross, leaves, map_scalars
 from screwkin.kinematics.positions import screws_in
 from screwkin.model.robot import Limb, Robot
-from screwkin.screw import Screw, at, displacement, transport
-from screwkin.se3 import IDENTITY, UNTURNED, Pose, Twist, Vector, cross, leaves, map_scalars
 
 Scalar = Any
 _ROUNDING = 1e-12

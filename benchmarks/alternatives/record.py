@@ -13,8 +13,8 @@ import screwkin as sk
 from benchmarks.alternatives.elimination import Pivots, choose_pivots
 from benchmarks.alternatives.formulas import limb_works, unpacked
 from benchmarks.workloads import motion
+from screwkin.algebra.se3 import leaves
 from screwkin.model.robot import Robot
-from screwkin.se3 import leaves
 
 Array = Any
 LANES = Path(__file__).with_name("lanes.hpp")

@@ -15,8 +15,8 @@ from benchmarks.alternatives.elimination import solve
 from benchmarks.alternatives.formulas import input_size, limb_works, unpacked
 from benchmarks.alternatives.record import LANES, Array, Way, outputs, pivots_of
 from benchmarks.compiler import FAST, compiled, over_columns
+from screwkin.algebra.se3 import leaves, map_scalars
 from screwkin.model.robot import Robot
-from screwkin.se3 import leaves, map_scalars
 
 Program = tuple[list[Any], list[tuple[Any, Any]], list[Any]]
 """Input symbols, assignments in order, outputs."""

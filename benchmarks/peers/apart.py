@@ -23,8 +23,8 @@ from benchmarks.contest import Contestant, Contestants, Result
 from benchmarks.environments import environment, folder
 from benchmarks.timing import Elapsed
 from benchmarks.workloads import Reach, Stance
+from screwkin.kinematics.serial_chain import Chain
 from screwkin.model.robot import Robot
-from screwkin.solve.chain import Chain
 
 MARK = "@@ "
 """Begins every line of the child that is meant for the parent: libraries print what they like."""

@@ -8,9 +8,9 @@ import numpy as np
 
 from benchmarks.contest import Contestant, Contestants, Result
 from benchmarks.workloads import Reach
+from screwkin.algebra.se3 import as_array
 from screwkin.analysis.ik_others import offset_parameters
 from screwkin.model.robot import Robot
-from screwkin.se3 import as_array
 
 THREADS = (1, 2)
 

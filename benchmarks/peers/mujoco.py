@@ -10,9 +10,9 @@ from scipy.spatial.transform import Rotation
 from benchmarks.contest import Contestant, Contestants, Result
 from benchmarks.peers.pinocchio_python import as_slice, seen_from_base, zmp
 from benchmarks.workloads import Dynamic, Motion
+from screwkin.algebra.se3 import as_array
 from screwkin.model.robot import Robot
 from screwkin.model.urdf import urdf_frames, urdf_from_robot
-from screwkin.se3 import as_array
 
 Array = Any
 NAME = "MuJoCo, Python"

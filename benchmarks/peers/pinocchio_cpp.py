@@ -22,8 +22,8 @@ from scipy.spatial.transform import Rotation
 from benchmarks.compiler import FAST, compiled, compiler
 from benchmarks.environments import folder, installed_apart
 from benchmarks.workloads import Motion
+from screwkin.algebra.se3 import as_array
 from screwkin.model.robot import Limb, Robot
-from screwkin.se3 import as_array
 
 Array = Any
 SOURCE = Path(__file__).with_name("pinocchio_loop.cpp")

@@ -9,10 +9,10 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.contest import Contestant, Contestants, Result
 from benchmarks.workloads import Dynamic, Motion, Reach
+from screwkin.algebra.se3 import as_array
 from screwkin.analysis.ik_others import pinocchio_model
 from screwkin.model.robot import Robot
 from screwkin.model.urdf import urdf_frames, urdf_from_robot
-from screwkin.se3 import as_array
 
 Array = Any
 NAME = "Pinocchio, Python"

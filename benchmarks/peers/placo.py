@@ -10,9 +10,9 @@ import numpy as np
 
 from benchmarks.contest import Contestant, Contestants, Result
 from benchmarks.workloads import Reach, Stance
+from screwkin.algebra.se3 import as_array
 from screwkin.model.robot import Limb, Robot
 from screwkin.model.urdf import urdf_frames, urdf_from_robot
-from screwkin.se3 import as_array
 
 Array = Any
 TOLERANCE, MOST = 1e-7, 50
@@ -99,7 +99,7 @@ def reach(robot: Robot, given: Reach) -> Contestants:
 
 def _judged(q: Array, rests: Array, given: Reach) -> Result:
     """At rest means solved only where the tip has arrived too: it also rests at the nearest pose."""
-    from screwkin.solve.chain import distance
+    from screwkin.kinematics.serial_chain import distance
 
     return {"q": q, "solved": rests & (distance(given.chain, q, given.target) < 1e-6)}
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from benchmarks.contest import Contestant, Contestants, Result
 from benchmarks.workloads import Reach
+from screwkin.algebra.se3 import as_array
 from screwkin.model.robot import Robot
-from screwkin.se3 import as_array
 
 Array = Any
 TOLERANCE = 1e-12

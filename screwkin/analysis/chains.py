@@ -10,15 +10,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from screwkin.algebra.scalar import Scalar
+from screwkin.algebra.screws import Screw, displacement, transport
+from screwkin.algebra.se3 import IDENTITY, UNTURNED, ZERO, Pose, Twist, cross, rotate
 from screwkin.errors import InputError
 from screwkin.kinematics.positions import screws_in
 from screwkin.model.dh import Convention, DHTable, dh_frames, dh_jacobian
 from screwkin.model.dh_csv import load_dh
 from screwkin.model.dh_derive import dh_from_screws
 from screwkin.model.robot import Robot
-from screwkin.scalar import Scalar
-from screwkin.screw import Screw, displacement, transport
-from screwkin.se3 import IDENTITY, UNTURNED, ZERO, Pose, Twist, cross, rotate
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.screws import at
+from screwkin.algebra.se3 import Pose, as_array, leaves, pose_from_array, rotation_log
 from screwkin.analysis.chains import Chain, by_dh, by_screws, by_steps, chains_of, support_models
 from screwkin.analysis.misalignment import Misalignment, misalignment, sensitivity
 from screwkin.analysis.operations import operations
@@ -20,10 +23,6 @@ from screwkin.errors import InputError
 from screwkin.mechanism.choice import characteristic_length
 from screwkin.model.dh import DHTable, dh_fk
 from screwkin.model.robot import Robot
-from screwkin.screw import at
-from screwkin.se3 import Pose, as_array, leaves, pose_from_array, rotation_log
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 BATCH = 200
 """Joint positions per evaluation when times are measured: small enough for memory to play no part."""
@@ -187,7 +186,7 @@ def _parameters(chains: Sequence[Chain], models: int) -> dict[str, int]:
     """Numbers in the tables.
 
     ``dh``: four per joint and six for base and tool of every chain, in every model; ``dh_per_model``;
-    ``screw``: six per joint (s and s0) and six per tip; ``dh_not_zero`` and ``screw_not_zero``: those of one
+    ``screws``: six per joint (s and s0) and six per tip; ``dh_not_zero`` and ``screw_not_zero``: those of one
     model that are not 0. The least that determine a chain of n revolute joints are 4 n + 6: screws hold two
     more per joint, the length of s and the place of s0 along it.
     """

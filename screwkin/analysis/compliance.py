@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from screwkin.dynamics.springs import StiffnessChoice
+from screwkin.compliance.springs import StiffnessChoice
 from screwkin.errors import InputError
 from screwkin.gait.compensation import WAYS, compensate, way_of
 from screwkin.model.robot import Robot

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from screwkin.dynamics.springs import joint_stiffness
+from screwkin.compliance.springs import joint_stiffness
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.gait.compensation import stiffness_of
 from screwkin.model.robot import Robot

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-Array = Any
+from screwkin.algebra.arrays import Array
 
 GRAVITY = 9.81
 

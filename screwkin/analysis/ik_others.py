@@ -13,12 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from screwkin.se3 import as_array
-from screwkin.solve.chain import Chain, distance
-from screwkin.solve.closed import EXACT
-from screwkin.solve.ik import IkSettings
-
-Array = Any
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import as_array
+from screwkin.ik.closed import EXACT
+from screwkin.ik.numeric import IkSettings
+from screwkin.kinematics.serial_chain import Chain, distance
 
 
 @dataclass(frozen=True, eq=False)

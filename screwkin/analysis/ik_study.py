@@ -9,20 +9,18 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
+from screwkin.algebra.arrays import Array
 from screwkin.analysis.ik_others import OTHERS, Outcome
 from screwkin.analysis.ik_targets import path_notes, random_targets, walking_path, walking_targets
 from screwkin.errors import InputError
+from screwkin.ik.closed import closed_form
+from screwkin.ik.hybrid import spherical_variant
+from screwkin.ik.numeric import IkSettings, Method, solve_limb
+from screwkin.kinematics.serial_chain import Chain
 from screwkin.model.robot import Robot
-from screwkin.solve.chain import Chain
-from screwkin.solve.closed import closed_form
-from screwkin.solve.hybrid import spherical_variant
-from screwkin.solve.ik import IkSettings, Method, solve_limb
-
-Array = Any
 
 PAPER_TABLE_5 = {
     "analytical": (1, 0.04),

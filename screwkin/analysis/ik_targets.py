@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import as_array, unstack
 from screwkin.analysis.foot_path import FootPath, foot_from_waist
 from screwkin.errors import InputError, UnreachableError
-from screwkin.se3 import as_array, unstack
-from screwkin.solve.chain import Chain, forward
-from screwkin.solve.ik import IkSettings, solve_limb
-
-Array = Any
+from screwkin.ik.numeric import IkSettings, solve_limb
+from screwkin.kinematics.serial_chain import Chain, forward
 
 HIGHEST = 0.43 / 0.437
 """Height of the waist over that with straight legs in paper B's gait."""

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from screwkin.algebra.arrays import Array
 from screwkin.analysis.stiffness_maps import DeflectionMap
 from screwkin.analysis.workspace import OUT_OF_REACH, WorkspaceMap
-
-Array = Any
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,17 +10,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.screws import Screw
+from screwkin.algebra.se3 import Vector, as_array, cross, dot, norm, rotate, rotation_log
 from screwkin.analysis.chains import Chain, by_screws
 from screwkin.model.dh import DHTable, dh_fk
 from screwkin.model.dh_derive import dh_from_screws
-from screwkin.screw import Screw
-from screwkin.se3 import Vector, as_array, cross, dot, norm, rotate, rotation_log
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 TILTS = tuple(10.0**-k for k in range(1, 10))
 """Tilts of the series [rad]."""

@@ -8,15 +8,16 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from screwkin import scalar, screw, se3
+from screwkin.algebra import scalar, se3
+from screwkin.algebra import screws as screw
+from screwkin.algebra.screws import Screw
+from screwkin.algebra.se3 import UNTURNED, Pose, Twist, Vector, leaves, map_scalars
 from screwkin.analysis import chains
 from screwkin.analysis.chains import Chain, by_dh, by_screws, by_steps
 from screwkin.cache import remembered
 from screwkin.kinematics import positions
 from screwkin.kinematics.positions import screws_in
 from screwkin.model import dh
-from screwkin.screw import Screw
-from screwkin.se3 import UNTURNED, Pose, Twist, Vector, leaves, map_scalars
 
 _COUNTED = (chains, positions, dh, screw, se3, scalar)
 """Modules whose formulas are counted."""
@@ -36,7 +37,7 @@ def operations(chains: Sequence[Chain]) -> Mapping[str, Count]:
     tables fold away. The ways are
 
     - ``dh``: the chains' tables;
-    - ``screw``: successive displacements in the base frame;
+    - ``algebra.screws``: successive displacements in the base frame;
     - ``screw_best_reference``: the same, with each chain's screws told at the joint axis where that is
       cheapest; the Jacobian is told there too, the tip's pose still in the base frame;
     - ``screw_by_steps``: the same screws, carried from axis point to axis point.

@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from screwkin.algebra.arrays import Array
 from screwkin.errors import SafetyError, UnknownNameError
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
-from screwkin.trajectory import Array, Trajectory, load_trajectory, sha256_of
+from screwkin.trajectory import Trajectory, load_trajectory, sha256_of
 
 VERDICT = "validation.json"
 _ROUNDING = 1e-9  # a posture may lie on a limit, up to rounding

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from screwkin.algebra.arrays import Array
 from screwkin.errors import InputError
 from screwkin.model.robot import Robot
 from screwkin.servo.log import PlayLog
 from screwkin.servo.servo_map import ServoMap
 from screwkin.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 _FEWEST = 6  # readings of a joint: a cubic with some to spare
 _LAGS = np.arange(0.0, 0.2, 0.001)  # s

@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
+from screwkin.algebra.arrays import Array
 from screwkin.analysis.workspace import WorkspaceMap
-from screwkin.dynamics.springs import StiffnessChoice, joint_stiffness
-from screwkin.dynamics.stiffness import Method, static_deflection
+from screwkin.compliance.springs import StiffnessChoice, joint_stiffness
+from screwkin.compliance.stiffness import Method, static_deflection
 from screwkin.errors import InputError
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 
-Array = Any
 BLOCK = 65_536
 """Points computed together, between two calls of ``progress``."""
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from screwkin.algebra.arrays import Array
 from screwkin.analysis.compliance import Conditions, StudyRow, Trial, repeated, summarised
 from screwkin.analysis.engines import Engine, Yielding, opened
 from screwkin.errors import InputError
@@ -15,7 +16,6 @@ from screwkin.gait.balance import zmp as balance_of
 from screwkin.gait.compensation import way_of
 from screwkin.gait.intended import intended
 from screwkin.model.robot import Robot
-from screwkin.sim.backend import Array
 from screwkin.sim.camera import Camera, Picture
 from screwkin.sim.compliant import CompliantBackend
 from screwkin.sim.measure import WINDOW, Slip, ZmpRecord, slip, speed_use, torque_use, zmp_record

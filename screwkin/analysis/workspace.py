@@ -12,21 +12,20 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import as_array, cross, dot, norm
+from screwkin.compiler.run import run
 from screwkin.errors import InputError
-from screwkin.kernel.limbs import solvable
-from screwkin.kernel.maps import limb_map
-from screwkin.kernel.run import FROM, run
+from screwkin.ik.limb_map import limb_map
+from screwkin.ik.numeric import IkSettings, solve_limb
+from screwkin.ik.programs import solvable
+from screwkin.ik.solutions import LimbSolutions
+from screwkin.kinematics.serial_chain import Chain, missing
 from screwkin.model.robot import Robot
-from screwkin.se3 import as_array, cross, dot, norm
-from screwkin.solve.branches import LimbSolutions
-from screwkin.solve.chain import Chain, missing
-from screwkin.solve.ik import IkSettings, solve_limb
 
-Array = Any
 Progress = Callable[[float], None]
 
 LEVELS = (0.745, 0.80, 0.86, 0.915, 0.985)
@@ -169,7 +168,7 @@ def _level(robot: Robot, chain: Chain, height: float, resolution: float, progres
     inverse, q = np.full(count, np.nan), np.full((count, n), np.nan)
     length, guess = normalising_length(chain), _guess(robot, chain)
     tried = np.flatnonzero(near)
-    compiled = len(tried) >= FROM and solvable(robot, chain.limb, True)
+    compiled = solvable(robot, chain.limb, True)
     block = LARGE_BLOCK if compiled else BLOCK
     for begin in range(0, len(tried), block):
         here = tried[begin : begin + block]

@@ -18,9 +18,9 @@ from screwkin.errors import InputError, OutputError
 from screwkin.model.table import load_robot
 from screwkin.servo.line import MonotonicClock
 from screwkin.servo.servo_map import ServoMap
-from screwkin.servo.virtual import virtual_servos
-from screwkin.servo.virtual_bus import VirtualBus
-from screwkin.servo.virtual_terminal import PseudoTerminal
+from screwkin.servo.virtual.bus import VirtualBus
+from screwkin.servo.virtual.robot import virtual_servos
+from screwkin.servo.virtual.terminal import PseudoTerminal
 
 
 def virtual(

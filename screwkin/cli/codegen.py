@@ -9,8 +9,8 @@ import typer
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, RobotName
 from screwkin.cli.output import print_json
+from screwkin.export.codegen import KINDS, c_files, programs_of
 from screwkin.files import atomic_write
-from screwkin.kernel.codegen import KINDS, c_files, programs_of
 from screwkin.model.table import load_robot
 
 

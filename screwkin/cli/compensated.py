@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from screwkin.cli.output import aligned
-from screwkin.dynamics.springs import joint_stiffness
+from screwkin.compliance.springs import joint_stiffness
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.files import make_folder
 from screwkin.gait.compensation import WAYS, Remaining, Way, compensate, convergence

@@ -9,6 +9,8 @@ from typing import Annotated, Any
 
 import typer
 
+from screwkin.algebra.scalar import Scalar
+from screwkin.analysis.facts import Facts, facts_of
 from screwkin.analysis.validate import Validation
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder
@@ -22,10 +24,8 @@ from screwkin.gait.record import Gait
 from screwkin.model.library import robot_names
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
-from screwkin.report.facts import Facts, facts_of
 from screwkin.report.numbers import balance_numbers, validation_numbers
 from screwkin.report.pictures import Saved, save_servo_pictures
-from screwkin.scalar import Scalar
 
 Tell = Callable[[str], None]
 

@@ -6,11 +6,11 @@ from typing import Annotated
 
 import typer
 
+from screwkin.analysis.facts import Facts, facts_of
 from screwkin.cli.options import AsJson, RobotName, place
 from screwkin.cli.output import aligned, print_json
-from screwkin.kernel.run import large_batches
+from screwkin.compiler.run import large_batches
 from screwkin.model.table import load_robot
-from screwkin.report.facts import Facts, facts_of
 
 
 def info(

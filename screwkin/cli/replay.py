@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
+from screwkin.analysis.account import account_of, recorded_robot
 from screwkin.analysis.replay import replayed
 from screwkin.analysis.validate import Criteria, Validation
 from screwkin.cli.folder import output_folder
 from screwkin.cli.output import aligned, print_json, remark
 from screwkin.cli.simulation import Wish, print_verdict, simulate
-from screwkin.report.account import account_of, recorded_robot
 from screwkin.report.numbers import validation_numbers
 from screwkin.report.pictures import save_servo_pictures
 from screwkin.servo.log import load_log

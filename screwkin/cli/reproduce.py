@@ -11,14 +11,14 @@ from typing import Annotated
 
 import typer
 
-from screwkin.analysis.bench import Bench
-from screwkin.analysis.papers import load_paper
-from screwkin.analysis.reproduce import MARKS, Reproduction, check_paper, written
-from screwkin.analysis.reproduce import reproduce as measured
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder
 from screwkin.cli.output import aligned, plain, print_json, progress_bar
 from screwkin.files import atomic_write
+from screwkin.papers.bench import Bench
+from screwkin.papers.claims import load_paper
+from screwkin.papers.reproduce import MARKS, Reproduction, check_paper, written
+from screwkin.papers.reproduce import reproduce as measured
 
 _TRACED = ("screwkin", "numpy", "scipy", "pybullet")
 
@@ -38,7 +38,7 @@ def reproduce(
     paper = load_paper(name)
     check_paper(paper)
     if plots:
-        from screwkin.report.reproduction import check_pictures
+        from screwkin.papers.page import check_pictures
 
         check_pictures(paper)
     bench = Bench(paper.robot, paper.changes)
@@ -61,7 +61,7 @@ def reproduce(
 
 
 def _draw(found: Reproduction, bench: Bench, folder: Path, command: str) -> None:
-    from screwkin.report.reproduction import draw_pictures, write_pages
+    from screwkin.papers.page import draw_pictures, write_pages
 
     with progress_bar("pictures") as done:
         pictures = draw_pictures(found.paper, bench, folder, done)

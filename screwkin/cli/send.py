@@ -23,9 +23,9 @@ from screwkin.servo.bus import Bus, open_line
 from screwkin.servo.gate import Bounds
 from screwkin.servo.player import Frames, Outcome, Player, PlaySettings, State, describe, frames_of
 from screwkin.servo.servo_map import ServoMap
-from screwkin.servo.virtual import virtual_servos
-from screwkin.servo.virtual_bus import SimulatedClock, VirtualBus
-from screwkin.servo.virtual_trouble import Trouble
+from screwkin.servo.virtual.bus import SimulatedClock, VirtualBus
+from screwkin.servo.virtual.faults import Trouble
+from screwkin.servo.virtual.robot import virtual_servos
 
 _STATES: tuple[State, ...] = ("hold", "limp")
 _INTERRUPTED = 130

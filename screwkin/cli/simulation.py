@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
+from screwkin.analysis.account import Account
 from screwkin.analysis.engines import ENGINES, Engine, Yielding
 from screwkin.analysis.validate import Criteria, Validation
 from screwkin.analysis.validate import validate as validated
 from screwkin.cli.output import plain, progress_bar, remark
 from screwkin.errors import UnknownNameError
 from screwkin.files import atomic_write
-from screwkin.report.account import Account
 from screwkin.report.page import write_page
 from screwkin.report.pictures import Saved, save_pictures
 from screwkin.sim.camera import Camera, save_gif

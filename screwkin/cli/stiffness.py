@@ -14,8 +14,8 @@ from screwkin.analysis.stiffness_maps import DeflectionMap, stiffness_maps
 from screwkin.cli.maps import Heights, LimbName, MapResult, Pictures, Resolution, made_maps, reached_maps
 from screwkin.cli.options import AsJson, OutputFolder, RobotName
 from screwkin.cli.output import progress_bar
-from screwkin.dynamics.springs import joint_stiffness
-from screwkin.dynamics.stiffness import Method
+from screwkin.compliance.springs import joint_stiffness
+from screwkin.compliance.stiffness import Method
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
 

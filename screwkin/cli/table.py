@@ -6,13 +6,13 @@ from typing import Annotated, Any
 
 import typer
 
+from screwkin.algebra.scalar import is_symbolic
 from screwkin.cli.options import AsJson, RobotName
 from screwkin.cli.output import print_json
 from screwkin.errors import InputError
 from screwkin.mechanism.printing import Style, print_symbolic, screw_rows, screw_table
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
-from screwkin.scalar import is_symbolic
 
 
 def table(

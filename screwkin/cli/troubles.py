@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from screwkin.errors import InputError
-from screwkin.servo.virtual_trouble import KINDS, Trouble
+from screwkin.servo.virtual.faults import KINDS, Trouble
 
 Troubles = Annotated[
     list[str] | None,

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from screwkin.analysis.account import account_of, recorded_robot
 from screwkin.analysis.engines import Yielding
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, TrajectoryPath
@@ -18,7 +19,6 @@ from screwkin.cli.simulation import Wish, print_verdict, simulate
 from screwkin.cli.simulation import engine as engine_named
 from screwkin.errors import InputError, OutputError
 from screwkin.files import make_folder
-from screwkin.report.account import account_of, recorded_robot
 from screwkin.report.numbers import validation_numbers
 from screwkin.sim.compliant import Compliance
 from screwkin.trajectory import load_trajectory

@@ -11,7 +11,7 @@ from screwkin.errors import SafetyError
 from screwkin.model.table import load_robot
 from screwkin.servo.log import load_log
 from screwkin.servo.player import PlaySettings, describe
-from screwkin.servo.virtual_bus import VirtualBus
+from screwkin.servo.virtual.bus import VirtualBus
 
 
 def played_to_virtual(trajectory: Path, robot: str, log: Path) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from screwkin.analysis.account import Account, account_of
 from screwkin.cli.compensated import CompensateBy, Passes, ServoStiffness, compensated, remedy
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, RobotName, settings
@@ -18,7 +19,6 @@ from screwkin.gait.record import Gait
 from screwkin.gait.walk import walk as walk_of
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
-from screwkin.report.account import Account, account_of
 from screwkin.report.numbers import walk_data, walk_numbers
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from screwkin.analysis.account import account_of, recorded_robot
 from screwkin.cli.options import AsJson, TrajectoryPath
 from screwkin.cli.output import aligned, print_json, remark
-from screwkin.report.account import account_of, recorded_robot
 from screwkin.report.numbers import balance_data, balance_numbers
 from screwkin.trajectory import load_trajectory
 

@@ -10,11 +10,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from screwkin.algebra.scalar import Scalar
+from screwkin.algebra.screws import Wrench, at, power
+from screwkin.algebra.se3 import ZERO, Pose, Rotation, Twist, Vector, X, Y, Z, bracket, cross, dot
 from screwkin.kinematics.positions import joint_twists, link_displacements
 from screwkin.model.robot import Inertia, Robot
-from screwkin.scalar import Scalar
-from screwkin.screw import Wrench, at, power
-from screwkin.se3 import ZERO, Pose, Rotation, Twist, Vector, X, Y, Z, bracket, cross, dot
 
 GRAVITY = 9.81
 """Acceleration of free fall [m/s^2], along -z."""

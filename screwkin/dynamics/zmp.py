@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from screwkin.screw import Wrench, wrench_at
-from screwkin.se3 import Vector
+from screwkin.algebra.screws import Wrench, wrench_at
+from screwkin.algebra.se3 import Vector
 
 
 def zmp_from_wrench(wrench: Wrench, origin: Vector) -> Vector:

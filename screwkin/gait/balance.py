@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from screwkin.algebra.arrays import Array
+from screwkin.compiler.run import run
+from screwkin.dynamics.body import balance
+from screwkin.dynamics.margin import support_margin_fast
 from screwkin.dynamics.support import Spike, sole_corners, spikes
 from screwkin.errors import InputError
-from screwkin.kernel.body import balance
-from screwkin.kernel.margin import support_margin_fast
-from screwkin.kernel.run import FROM, run
 from screwkin.model.robot import Robot
 from screwkin.trajectory import Trajectory
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +71,7 @@ def ground_reaction(
     """
     told = {"T_world_base": T_world_base, "q": q, "qd": qd, "qdd": qdd}
     told |= {"base_twist": twist, "base_acceleration": acceleration}
-    found = run(balance.program(robot), told) if len(q) >= FROM else balance.values(robot, told=told)
+    found = run(balance.program(robot), told)
     return found["zmp"], found["com"], found["wrench"], found["cart_table"]
 
 

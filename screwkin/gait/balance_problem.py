@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from screwkin.algebra.arrays import Array
 from screwkin.dynamics.support import convex_hull
 from screwkin.errors import UnknownNameError
 from screwkin.gait.balance import soles_on_floor
@@ -16,8 +16,6 @@ from screwkin.gait.waist_layout import Layout
 from screwkin.gait.walk import walk
 from screwkin.model.robot import Robot
 from screwkin.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 _STEP = 2e-4  # m: of the finite differences; ZMP and joints are nearly linear over ten times as much
 _SHORTEST = 0.01  # m per step: a walk on the spot still needs a scale for its progress

@@ -20,25 +20,25 @@ from __future__ import annotations
 import numbers
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from screwkin.dynamics.springs import StiffnessChoice, joint_stiffness
-from screwkin.dynamics.stiffness import Deflection, static_deflection
-from screwkin.dynamics.stiffness import Method as StaticModel
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import as_array, pose_from_array, unstack
+from screwkin.compliance.springs import StiffnessChoice, joint_stiffness
+from screwkin.compliance.stiffness import Deflection, static_deflection
+from screwkin.compliance.stiffness import Method as StaticModel
 from screwkin.errors import InputError, LimitError, NoSolutionError
 from screwkin.gait.feed_forward import walking_torques
 from screwkin.gait.loads import load_shares
-from screwkin.kernel.pose import solve_samples
+from screwkin.ik.whole_body import solve_samples
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
-from screwkin.se3 import as_array, pose_from_array, unstack
 from screwkin.trajectory import Trajectory
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 Method = Literal["swing", "joint"]
 Model = Literal["linear", "nonlinear", "dynamic"]
 

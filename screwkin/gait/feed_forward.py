@@ -7,18 +7,22 @@ So neither ankle twists against the other, and torques pass without a jump into 
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.screws import Wrench, power
+from screwkin.algebra.se3 import (
+    as_array,
+    cross,
+    pose_from_array,
+    twist_from_array,
+    unstack,
+    vector_from_array,
+)
 from screwkin.dynamics.newton_euler import GRAVITY, Bodies, inverse_dynamics
 from screwkin.gait.loads import load_shares
 from screwkin.model.robot import Robot
-from screwkin.screw import Wrench, power
-from screwkin.se3 import as_array, cross, pose_from_array, twist_from_array, unstack, vector_from_array
 from screwkin.trajectory import Trajectory
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def walking_torques(robot: Robot, trajectory: Trajectory) -> Array:

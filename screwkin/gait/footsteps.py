@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from screwkin.algebra.arrays import Array
 from screwkin.errors import Fault, GaitError
 from screwkin.gait.motion import Motion, along
 from screwkin.gait.path import path_of
 from screwkin.gait.record import Gait
 from screwkin.gait.splines import clamped_cubic, extremes, held, minimum_jerk
 from screwkin.gait.stance import LEFT, RIGHT, Stance
-
-Array = NDArray[np.float64]
 
 _BELOW = 1e-9  # m: what rounding may put below the floor
 _ABOVE = 1.05  # of lift: a spline may overshoot its highest key point so far

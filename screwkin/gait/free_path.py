@@ -17,13 +17,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from screwkin.algebra.arrays import Array
 from screwkin.errors import Fault
 from screwkin.gait.motion import Function
 from screwkin.model.expression import ExpressionError, evaluate, near
-
-Array = NDArray[np.float64]
 
 HARMONICS = ("forward", "side")
 BUMPS = ("start_forward", "start_side", "stop_forward", "stop_side")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from screwkin.gait.compensation import change_rates
-from screwkin.kernel.pose import solve_samples
+from screwkin.ik.whole_body import solve_samples
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 from screwkin.trajectory import Trajectory

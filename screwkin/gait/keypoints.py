@@ -17,12 +17,11 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from screwkin.algebra.arrays import Array
 from screwkin.errors import Fault
 from screwkin.model.expression import ExpressionError, UnresolvedError, evaluate
 
-Array = NDArray[np.float64]
 ChannelKind = Literal["swing", "advance", "alternate", "repeat"]
 
 CHANNELS: Mapping[str, ChannelKind] = {

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
+from screwkin.algebra.arrays import Array
 from screwkin.errors import InputError
 from screwkin.trajectory import Trajectory
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
-
 
 TELLING = 0.1
 """Least way of the ZMP from foot to foot, as a share of their distance, that tells how the load moves."""

@@ -6,11 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from screwkin.se3 import Pose, Vector, Z, as_array, rotate
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import Pose, Vector, Z, as_array, rotate
 
-Array = NDArray[np.float64]
 Function = Callable[[Array, int], Array]
 """A function of the phase and its derivatives: f(phase, order), like scipy's piecewise polynomials."""
 

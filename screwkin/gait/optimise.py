@@ -13,15 +13,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from screwkin.algebra.arrays import Array
 from screwkin.errors import GaitError, InputError, NoSolutionError
 from screwkin.gait.balance_problem import Course, Problem, balance_problem
 from screwkin.gait.record import Gait
 from screwkin.gait.waist_layout import SHAPE, Layout, is_count
 from screwkin.model.robot import Robot
-
-Array = NDArray[np.float64]
 
 RESERVE = 1e-4  # m: the linear programs keep this much more from every bound, for what they do not see
 _FACETS = 16  # sides of the polygon that stands for the circle |GCoM - ZMP| = constant; 2 % too small

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import Twist, Vector, exp
 from screwkin.gait.motion import Motion
 from screwkin.gait.record import Gait
-from screwkin.se3 import Twist, Vector, exp
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

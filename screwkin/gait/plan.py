@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from screwkin.algebra.arrays import Array
 from screwkin.errors import Fault, GaitError, InputError
 from screwkin.gait.footsteps import Foothold, feet_motion, footholds
 from screwkin.gait.hands import hands_motion
@@ -20,8 +21,6 @@ from screwkin.gait.soles import check_soles
 from screwkin.gait.stance import Stance
 from screwkin.gait.timing import Timing
 from screwkin.gait.waist import waist_path
-
-Array = NDArray[np.float64]
 
 MOST_SAMPLES = 1_000_000  # a longer plan would fill the memory of a small computer
 

@@ -10,14 +10,12 @@ Source: Kajita et al. (2003); Katayama et al. (1985).
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from screwkin.algebra.arrays import Array
 from screwkin.dynamics.newton_euler import GRAVITY
 from screwkin.errors import InputError
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,10 +10,11 @@ the CoM (``com = "waist"``) is what the second paper does.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import as_array, pose_from_array, twist_from_array, unstack
 from screwkin.dynamics.newton_euler import Bodies, momentum
 from screwkin.errors import Fault, GaitError, NoSolutionError
 from screwkin.gait.balance import ground_reaction
@@ -30,9 +31,6 @@ from screwkin.kinematics.positions import link_displacements
 from screwkin.mechanism.mechanism import Mechanism
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
-from screwkin.se3 import as_array, pose_from_array, twist_from_array, unstack
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SETTINGS = ("dsp", "horizon", "Qe", "Qx", "R")
 """Numbers that a preview gait's file gives in ``[parameters]``."""

@@ -4,26 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
 
 import numpy as np
 
-from screwkin.dynamics.support import sole_corners
-from screwkin.errors import InputError
-from screwkin.gait.plan import Plan
-from screwkin.gait.stance import LEFT, RIGHT, Foot, Hand, Stance
-from screwkin.kernel.blocks import least_values
-from screwkin.kernel.motion import follows, motion
-from screwkin.kernel.pose import solve_samples
-from screwkin.kernel.records import identifier
-from screwkin.kernel.run import FROM, run
-from screwkin.kinematics.positions import frame_pose, link_displacements
-from screwkin.mechanism.mechanism import Mechanism
-from screwkin.mechanism.network import blend, coupling_twists, network_matrix
-from screwkin.mechanism.virtual_motion import primary_motion
-from screwkin.model.robot import Limb, Robot
-from screwkin.model.state import State
-from screwkin.se3 import (
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import (
     Twist,
     Vector,
     as_array,
@@ -32,16 +17,29 @@ from screwkin.se3 import (
     unstack,
     vector_from_array,
 )
-from screwkin.solve.pose import PoseSolution
-from screwkin.solve.rates import (
+from screwkin.compiler.records import identifier
+from screwkin.compiler.run import run
+from screwkin.dynamics.support import sole_corners
+from screwkin.errors import InputError
+from screwkin.gait.plan import Plan
+from screwkin.gait.stance import LEFT, RIGHT, Foot, Hand, Stance
+from screwkin.ik.loops import PoseSolution
+from screwkin.ik.whole_body import solve_samples
+from screwkin.kinematics.positions import frame_pose, link_displacements
+from screwkin.mechanism.least_values import least_values
+from screwkin.mechanism.mechanism import Mechanism
+from screwkin.mechanism.network import blend, coupling_twists, network_matrix
+from screwkin.mechanism.rates import (
     SecondarySolution,
     block_names,
     secondary_accelerations,
     secondary_rates,
 )
-from screwkin.solve.singularity import refuse_singular
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
+from screwkin.mechanism.singularity import refuse_singular
+from screwkin.mechanism.tip_motion import follows, motion
+from screwkin.mechanism.virtual_motion import primary_motion
+from screwkin.model.robot import Limb, Robot
+from screwkin.model.state import State
 
 
 def stance_of(robot: Robot) -> Stance:
@@ -129,7 +127,7 @@ def _turns(mechanism: Mechanism, tip: str) -> bool:
 def differentiate(mechanism: Mechanism, made: Plan, state: State) -> Motion:
     """Rates and accelerations of the joints from those of the plan, through N and its derivative."""
     q, T = unstack(state.q), pose_from_array(made.T_world_base)
-    if len(made.time) >= FROM and follows(robot := mechanism.robot, mechanism.secondary):
+    if follows(robot := mechanism.robot, mechanism.secondary):
         qd, qdd = _compiled_motion(robot, made, state.q)
         sigma = least_values(mechanism, made.T_world_base, state.q)
         found = SecondarySolution(qd, sigma, block_names(mechanism))

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from screwkin.algebra.arrays import Array
 from screwkin.dynamics.support import convex_hull
 from screwkin.errors import NoSolutionError
 from screwkin.gait.motion import Motion
 from screwkin.gait.record import Gait
 from screwkin.gait.stance import Stance
-
-Array = NDArray[np.float64]
 
 _TOUCH = 1e-9  # m: soles may touch
 

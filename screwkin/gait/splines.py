@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from screwkin.algebra.arrays import Array
 
 
 def clamped_cubic(at: Array, value: Array) -> Any:

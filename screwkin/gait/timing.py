@@ -10,11 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from screwkin.algebra.arrays import Array
 from screwkin.gait.motion import Motion
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from screwkin.algebra.arrays import Array
 from screwkin.gait.free_path import free_path
-from screwkin.gait.motion import Array, Function, Motion, along
+from screwkin.gait.motion import Function, Motion, along
 from screwkin.gait.record import Gait
 from screwkin.gait.splines import cyclic_cubic
 

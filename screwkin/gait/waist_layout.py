@@ -9,12 +9,11 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from screwkin.algebra.arrays import Array
 from screwkin.errors import InputError
 from screwkin.gait.free_path import BUMPS, HARMONICS, free_path
 from screwkin.gait.record import Gait, gait_from_dict
 from screwkin.gait.waist import waist_path
-
-Array = NDArray[np.float64]
 
 SHAPE: Mapping[str, int] = MappingProxyType({"forward": 6, "side": 8, **dict.fromkeys(BUMPS, 6)})
 """Numbers of coefficients of ``smooth``: three harmonics forward, four to the side, bumps of 2/15 step."""

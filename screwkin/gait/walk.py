@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import hashlib
 from importlib.metadata import PackageNotFoundError, version
-from typing import Any
 
-import numpy as np
-
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import as_array, pose_from_array, unstack
 from screwkin.errors import InputError
 from screwkin.gait.balance import ground_margin, ground_reaction, soles_on_floor
 from screwkin.gait.plan import Plan, plan
@@ -17,10 +16,7 @@ from screwkin.gait.record import Gait
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.mechanism.choice import closed_mechanism
 from screwkin.model.robot import Robot
-from screwkin.se3 import as_array, pose_from_array, unstack
 from screwkin.trajectory import Trajectory
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 TRACED = ("numpy", "scipy", "screwkin")
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from screwkin.algebra.scalar import Scalar, plus
+from screwkin.algebra.screws import Displacement, at
+from screwkin.algebra.se3 import ZERO, Pose, Twist, Vector
 from screwkin.model.robot import Robot
-from screwkin.scalar import Scalar, plus
-from screwkin.screw import Displacement, at
-from screwkin.se3 import ZERO, Pose, Twist, Vector
 
 Placements = Sequence[Pose | Displacement]
 """Where every link stands, in any frame."""

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from screwkin.algebra.scalar import Scalar
+from screwkin.algebra.screws import AT_REST, Displacement, Screw, advance, carry, displacement, transport
+from screwkin.algebra.se3 import IDENTITY, Pose, Twist
 from screwkin.model.robot import Robot
-from screwkin.scalar import Scalar
-from screwkin.screw import AT_REST, Displacement, Screw, advance, carry, displacement, transport
-from screwkin.se3 import IDENTITY, Pose, Twist
 
 
 def successive_displacement(

@@ -11,10 +11,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from screwkin import scalar
+from screwkin.algebra import scalar
+from screwkin.algebra.scalar import Scalar
+from screwkin.algebra.se3 import (
+    IDENTITY,
+    UNTURNED,
+    ZERO,
+    Pose,
+    Rotation,
+    Twist,
+    Vector,
+    X,
+    Y,
+    Z,
+    cross,
+    rotate,
+)
 from screwkin.errors import InputError
-from screwkin.scalar import Scalar
-from screwkin.se3 import IDENTITY, UNTURNED, ZERO, Pose, Rotation, Twist, Vector, X, Y, Z, cross, rotate
 
 SPATIAL = ("px", "py", "pz", "rx", "ry", "rz")
 PLANAR = ("px", "py", "rz")

@@ -12,14 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import UNTURNED, Rotation, norm, rotation_log
 from screwkin.errors import InputError, SingularError, UnknownNameError
 from screwkin.kinematics.positions import link_displacements
 from screwkin.mechanism.mechanism import Mechanism, coupling_graph, virtual_chains
 from screwkin.mechanism.network import coupling_twists, network_matrix
 from screwkin.model.robot import Robot
-from screwkin.se3 import UNTURNED, Rotation, norm, rotation_log
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 RANK_TOLERANCE = 1e-6
 """Smallest singular value, relative to the largest, of length-normalised screws still independent."""

@@ -12,11 +12,12 @@ from functools import cached_property
 
 import numpy as np
 
+from screwkin.algebra.pattern import components
+from screwkin.algebra.se3 import IDENTITY, Pose
 from screwkin.mechanism import graph as graphs
 from screwkin.mechanism.chains import SPATIAL, check_chain, held_pose
 from screwkin.mechanism.graph import Graph, Integers
 from screwkin.model.robot import Limb, Robot
-from screwkin.se3 import IDENTITY, Pose
 
 FLOOR = "floor"
 WAIST = "waist"
@@ -140,7 +141,7 @@ class Mechanism:
     @cached_property
     def blocks(self) -> list[tuple[list[int], list[int]]]:
         """Independent systems of secondary rates: (circuits, indices in ``secondary``)."""
-        return graphs.components(self.circuit_matrix[:, self.secondary_columns])
+        return components(self.circuit_matrix[:, self.secondary_columns])
 
     @cached_property
     def kutzbach(self) -> int:

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from screwkin.algebra.scalar import Scalar, is_jax
+from screwkin.algebra.screws import at
+from screwkin.algebra.se3 import NO_TWIST, ZERO, Pose, Rotation, Twist, Vector, as_array, bracket
 from screwkin.kinematics.positions import frame_pose, joint_twists, link_displacements
 from screwkin.mechanism.chains import chain_twists
 from screwkin.mechanism.graph import Integers
 from screwkin.mechanism.mechanism import Mechanism
-from screwkin.scalar import Scalar, is_jax
-from screwkin.screw import at
-from screwkin.se3 import NO_TWIST, ZERO, Pose, Rotation, Twist, Vector, as_array, bracket
 
 
 def coupling_twists(

@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
+from screwkin.algebra.scalar import Scalar, is_symbolic
+from screwkin.algebra.se3 import Vector, cross
 from screwkin.errors import InputError
 from screwkin.mechanism.symbolic import SymbolicLimb, symbolic_limb, symbolic_loops
 from screwkin.model.robot import Robot
-from screwkin.scalar import Scalar, is_symbolic
-from screwkin.se3 import Vector, cross
 
 Style = Literal["text", "markdown", "latex"]
 Symbol = Any

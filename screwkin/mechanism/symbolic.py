@@ -11,14 +11,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from screwkin.algebra.scalar import Scalar, is_symbolic
+from screwkin.algebra.se3 import ZERO, Twist, Vector, as_array, leaves, map_scalars
 from screwkin.errors import InputError
 from screwkin.kinematics.positions import frame_pose, joint_twists, link_displacements
 from screwkin.mechanism.chains import chain_screws
 from screwkin.mechanism.mechanism import Mechanism, coupling_graph, virtual_chains
 from screwkin.mechanism.network import network_blocks
 from screwkin.model.robot import Robot
-from screwkin.scalar import Scalar, is_symbolic
-from screwkin.se3 import ZERO, Twist, Vector, as_array, leaves, map_scalars
 
 Matrix = Any
 Symbol = Any

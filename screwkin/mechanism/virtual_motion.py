@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from screwkin.algebra.scalar import Scalar
+from screwkin.algebra.se3 import UNTURNED, ZERO, Pose, Rotation, Twist, Vector, cross, dot, rotate
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.mechanism.chains import AXES, chain_coordinates, rotations
 from screwkin.mechanism.mechanism import Mechanism, VirtualChain
-from screwkin.scalar import Scalar
-from screwkin.se3 import UNTURNED, ZERO, Pose, Rotation, Twist, Vector, cross, dot, rotate
 
 
 def _axes(chain: Sequence[str], R: Rotation) -> list[Vector]:

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 
+from screwkin.algebra.scalar import Scalar, times
+from screwkin.algebra.screws import INFINITE, Screw
+from screwkin.algebra.se3 import UNTURNED, ZERO, Pose, Vector, X, Y, Z, rotate
 from screwkin.model.mirror import (
     closes_within,
     interleaved,
@@ -17,9 +20,6 @@ from screwkin.model.robot import Box, Closure, Inertia, Joint, Limb, Link, Postu
 from screwkin.model.rows import Rows
 from screwkin.model.schema import ClosureRow, FrameRow, InertiaRow, JointRow, LimbRow, LinkRow, MirrorRow
 from screwkin.model.structure import Mirrored
-from screwkin.scalar import Scalar, times
-from screwkin.screw import INFINITE, Screw
-from screwkin.se3 import UNTURNED, ZERO, Pose, Vector, X, Y, Z, rotate
 
 
 def robot_from_rows(rows: Rows, joints: Sequence[Joint], mirrored: Sequence[Mirrored]) -> Robot:

@@ -18,10 +18,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from screwkin.algebra.scalar import Scalar, cos, minus, plus, sin, structural, times
+from screwkin.algebra.screws import INFINITE, Screw
+from screwkin.algebra.se3 import IDENTITY, Pose, Rotation, Twist, Vector
 from screwkin.errors import ShapeError
-from screwkin.scalar import Scalar, cos, minus, plus, sin, structural, times
-from screwkin.screw import INFINITE, Screw
-from screwkin.se3 import IDENTITY, Pose, Rotation, Twist, Vector
 
 Convention = Literal["standard", "modified"]
 DHType = Literal["revolute", "prismatic"]

@@ -21,12 +21,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import cast
 
+from screwkin.algebra.se3 import IDENTITY, Pose
 from screwkin.errors import Fault, TableError
 from screwkin.model.dh import CONVENTIONS, Convention, DHRow, DHTable, DHType, row_transform
 from screwkin.model.dh_derive import fixed_rows
 from screwkin.model.expression import listed, near
 from screwkin.model.toml import read_text
-from screwkin.se3 import IDENTITY, Pose
 
 UNITS: Mapping[str, tuple[str, ...]] = {
     "alpha": ("deg", "rad"),

@@ -21,6 +21,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+from screwkin.algebra.scalar import Scalar
+from screwkin.algebra.screws import Screw
+from screwkin.algebra.se3 import IDENTITY, Pose, Vector, cross, dot, map_scalars, norm
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.model.dh import (
     CONVENTIONS,
@@ -34,9 +37,6 @@ from screwkin.model.dh import (
 )
 from screwkin.model.robot import Robot
 from screwkin.model.values import UNIT_TOLERANCE
-from screwkin.scalar import Scalar
-from screwkin.screw import Screw
-from screwkin.se3 import IDENTITY, Pose, Vector, cross, dot, map_scalars, norm
 
 PARALLEL = 1e-8
 """Sine of the angle below which axes count as parallel: the square root of machine precision.

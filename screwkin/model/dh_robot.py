@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from screwkin.algebra.se3 import UNTURNED, ZERO, Pose, as_array
 from screwkin.errors import InputError
 from screwkin.model.dh import DHTable, screws_from_dh
 from screwkin.model.robot import Inertia, Joint, Limb, LimbKind, Link, Robot
 from screwkin.model.table import parse_robot
 from screwkin.model.toml_out import robot_toml
 from screwkin.model.values import COUPLINGS
-from screwkin.se3 import UNTURNED, ZERO, Pose, as_array
 
 BASE = "base_link"
 """The link from which all chains start."""

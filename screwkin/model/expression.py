@@ -16,8 +16,8 @@ from graphlib import CycleError, TopologicalSorter
 from types import SimpleNamespace
 from typing import Any
 
+from screwkin.algebra.scalar import Scalar, is_symbolic
 from screwkin.errors import Fault, InputError
-from screwkin.scalar import Scalar, is_symbolic
 
 CONSTANTS = ("pi", "deg", "mm")
 """Names that every table knows: pi, one degree in rad, one millimetre in m."""

@@ -13,9 +13,9 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
+from screwkin.algebra.screws import Screw
+from screwkin.algebra.se3 import Pose, Rotation, Vector
 from screwkin.model.robot import Box, Closure, Inertia, Joint, Limb, Link, Sole
-from screwkin.screw import Screw
-from screwkin.se3 import Pose, Rotation, Vector
 
 Item = TypeVar("Item")
 

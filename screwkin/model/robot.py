@@ -11,10 +11,10 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
+from screwkin.algebra.scalar import Scalar
+from screwkin.algebra.screws import Screw
+from screwkin.algebra.se3 import UNTURNED, Pose, Vector
 from screwkin.errors import UnknownNameError
-from screwkin.scalar import Scalar
-from screwkin.screw import Screw
-from screwkin.se3 import UNTURNED, Pose, Vector
 
 JointType = Literal["revolute", "prismatic", "helical"]
 LimbKind = Literal["leg", "arm"]

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from screwkin.algebra.scalar import Scalar
 from screwkin.errors import Fault
 from screwkin.model.expression import listed, near
 from screwkin.model.schema import ROWS, TABLES, RobotRow, Row, kind_of, label, read_row
-from screwkin.scalar import Scalar
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,8 @@ from typing import Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from screwkin.algebra.scalar import Scalar
+from screwkin.algebra.se3 import Vector
 from screwkin.errors import Fault
 from screwkin.model.expression import listed, near
 from screwkin.model.robot import JointType, LimbKind
@@ -26,8 +28,6 @@ from screwkin.model.values import (
     Unit,
     Value,
 )
-from screwkin.scalar import Scalar
-from screwkin.se3 import Vector
 
 
 class Row(BaseModel):

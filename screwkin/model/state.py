@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from screwkin.model.robot import Robot
+
 RIGID = 1e-6
 """Largest deviation from a rotation matrix that rounding and other writers may cause."""
 
@@ -26,3 +28,15 @@ def not_rigid(T: NDArray[np.float64]) -> NDArray[np.bool_]:
     skewed = np.abs(R @ R.swapaxes(-1, -2) - np.eye(3)).max(axis=(-2, -1)) > RIGID
     foreign = np.abs(T[..., 3, :] - np.array([0.0, 0.0, 0.0, 1.0])).max(axis=-1) > RIGID
     return np.asarray(skewed | foreign | (np.linalg.det(R) < 0))
+
+
+def home(robot: Robot, posture: str = "home") -> State:
+    """A named posture of the table: base upright over the world origin, at the posture's height.
+
+    Raises:
+        UnknownNameError: the table has no such posture.
+    """
+    chosen = robot.posture(posture)
+    T = np.eye(4)
+    T[2, 3] = chosen.base_height
+    return State(T, np.array(chosen.q, dtype=float))

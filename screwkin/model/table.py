@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from screwkin.algebra.scalar import Scalar
 from screwkin.errors import Fault, TableError
 from screwkin.model.build import all_joints, own_joints, robot_from_rows
 from screwkin.model.checks import row_faults
@@ -16,7 +17,6 @@ from screwkin.model.robot import Joint, Robot
 from screwkin.model.rows import Rows, parameters_of, read_rows
 from screwkin.model.structure import joint_names, mirrored_limbs, structure_faults
 from screwkin.model.toml import read_text, read_toml
-from screwkin.scalar import Scalar
 
 
 def load_robot(name_or_path: str | Path, symbolic: bool = False) -> Robot:

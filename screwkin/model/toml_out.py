@@ -10,11 +10,11 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from screwkin.algebra.scalar import Scalar, is_symbolic
+from screwkin.algebra.se3 import UNTURNED, ZERO, Pose, Rotation, Vector, leaves
 from screwkin.errors import InputError
 from screwkin.model.robot import Closure, Joint, Limb, Link, Robot, Sole
 from screwkin.model.values import COUPLINGS
-from screwkin.scalar import Scalar, is_symbolic
-from screwkin.se3 import UNTURNED, ZERO, Pose, Rotation, Vector, leaves
 
 _GIMBAL = 1e-9  # cosine of the pitch below which roll and yaw turn about the same axis
 

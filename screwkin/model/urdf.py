@@ -12,9 +12,9 @@ import math
 from collections.abc import Mapping
 from xml.etree import ElementTree
 
+from screwkin.algebra.se3 import UNTURNED, ZERO, Pose, Vector
 from screwkin.errors import InputError
 from screwkin.model.robot import Box, Joint, Link, Robot
-from screwkin.se3 import UNTURNED, ZERO, Pose, Vector
 
 Colour = tuple[float, float, float, float]
 

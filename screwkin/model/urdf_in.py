@@ -12,20 +12,18 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.screws import INFINITE, Screw
+from screwkin.algebra.se3 import IDENTITY, Pose, Vector, as_array, vector_from_array
 from screwkin.errors import TableError
 from screwkin.model.robot import Box, Inertia, Joint, Link, Robot
 from screwkin.model.table import parse_robot
 from screwkin.model.toml import read_text
 from screwkin.model.toml_out import robot_toml
 from screwkin.model.urdf_xml import TYPES, Edge, Element, Reader, base_of, named, read_joints, read_root
-from screwkin.screw import INFINITE, Screw
-from screwkin.se3 import IDENTITY, Pose, Vector, as_array, vector_from_array
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 _UNLIMITED = 1e9  # written by programs that have no word for infinity, this one among them
 _WHOLE = 1e-9  # how far a turned box may be from the base axes

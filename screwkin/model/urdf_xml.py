@@ -7,10 +7,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from screwkin.algebra.scalar import structural
+from screwkin.algebra.se3 import Pose, Vector, X, Y, Z, rotate
 from screwkin.errors import Fault, TableError
 from screwkin.model.robot import JointType
-from screwkin.scalar import structural
-from screwkin.se3 import Pose, Vector, X, Y, Z, rotate
 
 Element = Any
 

@@ -14,9 +14,9 @@ from typing import Annotated
 from pydantic import PlainValidator, ValidationInfo
 from pydantic_core import PydanticCustomError
 
+from screwkin.algebra.scalar import Scalar, is_symbolic, structural
+from screwkin.algebra.se3 import Vector
 from screwkin.model.expression import ExpressionError, UnresolvedError, evaluate, listed
-from screwkin.scalar import Scalar, is_symbolic, structural
-from screwkin.se3 import Vector
 
 UNIT_TOLERANCE = 1e-9
 """How far from 1 the length of an axis may be: what nine written digits cannot miss."""

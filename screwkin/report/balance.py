@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
+from screwkin.algebra.arrays import Array
+from screwkin.analysis.account import Account
 from screwkin.dynamics.support import Spike, convex_hull
 from screwkin.gait.balance import soles_on_floor
-from screwkin.report.account import Account
+from screwkin.mechanism.singularity import NEAR
 from screwkin.report.style import (
     GCOM,
     PLAIN,
@@ -25,9 +26,6 @@ from screwkin.report.style import (
     spans,
     time_axis,
 )
-from screwkin.solve.singularity import NEAR
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 _AXES = ("x", "y")
 _APART = 0.018  # of the duration: labels of spikes nearer than that would overlap

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import as_array, pose_from_array, unstack
+from screwkin.analysis.account import Account
 from screwkin.dynamics.support import convex_hull
 from screwkin.kinematics.positions import link_displacements
 from screwkin.model.robot import Robot
-from screwkin.report.account import Account
 from screwkin.report.style import Axes, Figure, limb_colours, new_figure
-from screwkin.se3 import as_array, pose_from_array, unstack
 from screwkin.sim.camera import Camera
 from screwkin.sim.render import pictures
 from screwkin.sim.run import Run
-
-Array = np.ndarray[Any, np.dtype[Any]]
 
 ROWS, COLUMNS = 2, 3
 

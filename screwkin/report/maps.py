@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from screwkin.algebra.arrays import Array
 from screwkin.analysis.stiffness_maps import DeflectionMap
 from screwkin.analysis.workspace import OUT_OF_REACH, REACHABLE, WorkspaceMap
 from screwkin.model.robot import Robot
 from screwkin.report.style import DPI, WIDTH, Axes, Figure, shown
-
-Array = Any
 
 REACHED, BEYOND = "#F4F1E4", "#D4D6DA"
 HUES = ("#0072B2", "#E69F00", "#CC3377", "#009E73", "#8B5FBF", "#D55E00", "#56B4E9", "#997700", "#555555")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from screwkin.report.account import Account
+from screwkin.analysis.account import Account
 from screwkin.report.style import (
     LINES,
     WAIST,

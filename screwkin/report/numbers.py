@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from screwkin.report.account import Account
+from screwkin.analysis.account import Account
 
 if TYPE_CHECKING:  # it brings the simulator, which a walk does without
     from screwkin.analysis.validate import Validation

@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
+from screwkin.analysis.account import Account
+from screwkin.analysis.facts import Facts, facts_of
 from screwkin.analysis.validate import Validation
 from screwkin.files import atomic_write
 from screwkin.model.robot import Robot
-from screwkin.report.account import Account
-from screwkin.report.facts import Facts, facts_of
 from screwkin.report.numbers import validation_numbers, walk_numbers
 from screwkin.report.pictures import Saved
 

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from screwkin.analysis.account import Account
 from screwkin.analysis.validate import Validation
 from screwkin.report import balance, frames, motion, servos, simulation
-from screwkin.report.account import Account
 from screwkin.report.style import Figure, save_figure, styled
 from screwkin.servo.log import PlayLog
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from screwkin.report.account import Account
+from screwkin.analysis.account import Account
 from screwkin.report.motion import HUES, common_prefix
 from screwkin.report.style import PLAIN, Figure, legend_above, new_figure, shade_swings, shown
 from screwkin.servo.log import PlayLog

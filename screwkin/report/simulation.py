@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from screwkin.analysis.account import Account
 from screwkin.analysis.validate import Validation
-from screwkin.report.account import Account
 from screwkin.report.style import (
     MEASURED,
     PLAIN,

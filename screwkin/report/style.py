@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from screwkin.analysis.account import Account
 from screwkin.files import atomic_path
-from screwkin.report.account import Account
 
 Figure = Any
 Axes = Any

@@ -17,12 +17,12 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from screwkin.algebra.arrays import Array
 from screwkin.errors import SafetyError
 from screwkin.model.robot import Robot
 from screwkin.servo.profiles import Profile, Register
 from screwkin.servo.servo_map import ServoMap
 
-Array = NDArray[np.float64]
 Ticks = NDArray[np.int64]
 
 _ROUNDING = 1e-6  # ticks: a posture may lie on a limit, up to rounding

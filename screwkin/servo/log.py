@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from screwkin.algebra.arrays import Array
 from screwkin.errors import InputError
 from screwkin.files import atomic_write_bytes, npz_bytes, read_npz
 
-Array = NDArray[np.float64]
 MEASURED = ("position", "speed", "load", "voltage", "temperature", "read_at")
 _GROWTH = 2
 

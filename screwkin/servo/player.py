@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from screwkin.algebra.arrays import Array
 from screwkin.errors import InputError, SafetyError
 from screwkin.model.robot import Robot
 from screwkin.servo.budget import block_of, budget
@@ -29,7 +29,6 @@ from screwkin.servo.servo_map import ServoMap
 from screwkin.servo.watch import FaultFound, ServoFault, Thresholds, Watch
 from screwkin.trajectory import Trajectory
 
-Array = NDArray[np.float64]
 State = Literal["hold", "limp"]
 _PEAK = 1.875  # greatest rate of a minimum-jerk motion, as a multiple of its mean
 

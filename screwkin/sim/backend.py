@@ -5,12 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from screwkin.algebra.arrays import Array
 from screwkin.model.state import State
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from screwkin.algebra.arrays import Array
 from screwkin.files import atomic_path
-from screwkin.sim.backend import Array
 
 Picture = NDArray[np.uint8]
 Colour = tuple[float, float, float]

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from screwkin.dynamics.springs import StiffnessChoice, joint_stiffness
+from screwkin.compliance.springs import StiffnessChoice, joint_stiffness
 from screwkin.errors import InputError
 from screwkin.model.robot import Robot
 from screwkin.model.state import State

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import as_array, pose_from_array, unstack
 from screwkin.errors import InputError
 from screwkin.kinematics import positions
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
-from screwkin.se3 import as_array, pose_from_array, unstack
-from screwkin.sim.backend import Array, Command, Observation
+from screwkin.sim.backend import Command, Observation
 
 
 class KinematicBackend:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from screwkin.algebra.arrays import Array
 from screwkin.model.robot import Robot
-from screwkin.sim.backend import Array
 from screwkin.sim.run import Run
 from screwkin.trajectory import Trajectory
 

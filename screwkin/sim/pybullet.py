@@ -21,12 +21,13 @@ from typing import Any
 
 import numpy as np
 
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import as_array
 from screwkin.errors import InputError, MissingDependencyError
 from screwkin.model.robot import Limb, Robot
 from screwkin.model.state import State
 from screwkin.model.urdf import urdf_frames, urdf_from_robot
-from screwkin.se3 import as_array
-from screwkin.sim.backend import Array, Command, Contact, Observation
+from screwkin.sim.backend import Command, Contact, Observation
 from screwkin.sim.camera import Camera
 
 UNLIMITED = 1e9

@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import IDENTITY, Vector, as_array, unstack
 from screwkin.kinematics.positions import link_displacements
 from screwkin.model.robot import Robot
 from screwkin.model.urdf import link_colours
-from screwkin.se3 import IDENTITY, Vector, as_array, unstack
-from screwkin.sim.backend import Array
 from screwkin.sim.camera import Camera, Picture, View, following, view_of
 
 FINER = 2

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from screwkin.algebra.arrays import Array
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
-from screwkin.sim.backend import Array, Backend, Command, Observation
+from screwkin.sim.backend import Backend, Command, Observation
 from screwkin.trajectory import Trajectory
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import sympy
 
+from screwkin.algebra.se3 import as_array
 from screwkin.analysis.chains import by_dh, by_screws, by_steps, chains_of, reversed_table, support_models
 from screwkin.analysis.compare import compare_models, differences, random_positions
 from screwkin.analysis.misalignment import misalignment, sensitivity
@@ -20,7 +21,6 @@ from screwkin.model.dh import DHRow, DHTable
 from screwkin.model.library import data_folder, robot_names
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot, parse_robot
-from screwkin.se3 import as_array
 from tests.model.chains import fk_by_matrices, random_chain
 
 

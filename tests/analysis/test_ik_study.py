@@ -13,10 +13,10 @@ from screwkin.analysis.foot_path import FootPath, foot_from_waist
 from screwkin.analysis.ik_study import IkRow, fitting_entries, ik_study, measured
 from screwkin.analysis.ik_targets import random_targets, walking_path, walking_targets
 from screwkin.errors import InputError, UnknownNameError, UnreachableError
+from screwkin.ik.numeric import IkSettings, solve_limb
+from screwkin.kinematics.serial_chain import Chain
 from screwkin.model.table import load_robot
-from screwkin.solve.chain import Chain
-from screwkin.solve.ik import IkSettings, solve_limb
-from tests.solve.legs import apart
+from tests.ik.legs import apart
 
 PATH = FootPath(lateral=0.048, height=0.43, stride=0.06, lift=0.03)
 

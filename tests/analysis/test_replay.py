@@ -19,8 +19,8 @@ from screwkin.servo.bus import Bus
 from screwkin.servo.log import PlayLog, load_log
 from screwkin.servo.player import Player
 from screwkin.servo.servo_map import ServoMap
-from screwkin.servo.virtual import virtual_servos
-from screwkin.servo.virtual_bus import SimulatedClock, VirtualBus
+from screwkin.servo.virtual.bus import SimulatedClock, VirtualBus
+from screwkin.servo.virtual.robot import virtual_servos
 from screwkin.trajectory import Trajectory
 
 ROBOT = load_robot("bioloid")

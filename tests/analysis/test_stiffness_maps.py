@@ -11,7 +11,7 @@ import screwkin as sk
 from screwkin.analysis.map_arrays import deflection_arrays
 from screwkin.analysis.stiffness_maps import other_leg, stiffness_maps
 from screwkin.analysis.workspace import workspace
-from screwkin.dynamics.stiffness import static_deflection
+from screwkin.compliance.stiffness import static_deflection
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.model.robot import Robot
 

@@ -11,12 +11,12 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 import screwkin as sk
+from screwkin.algebra.screws import Screw
+from screwkin.algebra.se3 import Vector
 from screwkin.analysis.map_arrays import workspace_arrays
 from screwkin.analysis.workspace import WorkspaceMap, default_heights, workspace
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.model.robot import Robot
-from screwkin.screw import Screw
-from screwkin.se3 import Vector
 
 PAPER = {0.325: 705, 0.350: 753, 0.375: 722, 0.400: 734, 0.430: 191}
 """Height [m] to area [cm^2]: foot level, ankle 31 mm above the sole, limits of the paper's table 1."""

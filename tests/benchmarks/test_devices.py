@@ -13,7 +13,7 @@ import pytest
 
 import screwkin as sk
 from benchmarks import devices
-from screwkin.kernel import body
+from screwkin.dynamics import body
 
 ROOT = Path(__file__).parents[2]
 
@@ -23,7 +23,7 @@ from dataclasses import asdict
 import jax, numpy as np
 import screwkin as sk
 from benchmarks.devices import measured
-from screwkin.kernel import body
+from screwkin.dynamics import body
 q = np.random.default_rng(0).uniform(-2, 2, (64, 12))
 given = {"T_world_base": np.tile(np.eye(4), (64, 1, 1)), "q": q}
 program = body.tip_poses.program(sk.load_robot("poppy12"))

@@ -6,7 +6,7 @@ import pytest
 
 import screwkin as sk
 from benchmarks.roofline import markdown, peak
-from screwkin.kernel import native
+from screwkin.compiler import native
 
 pytestmark = pytest.mark.skipif(native.compiler() is None, reason="no C compiler")
 

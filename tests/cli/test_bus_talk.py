@@ -14,10 +14,10 @@ from screwkin.model.table import load_robot
 from screwkin.servo.line import MonotonicClock
 from screwkin.servo.profiles import load_profile
 from screwkin.servo.servo_map import ServoMap
-from screwkin.servo.virtual import virtual_servos
-from screwkin.servo.virtual_bus import VirtualBus
-from screwkin.servo.virtual_servo import VirtualServo
-from screwkin.servo.virtual_terminal import PseudoTerminal
+from screwkin.servo.virtual.bus import VirtualBus
+from screwkin.servo.virtual.robot import virtual_servos
+from screwkin.servo.virtual.servo import VirtualServo
+from screwkin.servo.virtual.terminal import PseudoTerminal
 
 pytestmark = pytest.mark.realtime
 

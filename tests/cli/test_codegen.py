@@ -6,7 +6,7 @@ import subprocess
 
 import pytest
 
-from screwkin.kernel import native
+from screwkin.compiler import native
 
 WARNINGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-O1")
 needs_compiler = pytest.mark.skipif(native.compiler() is None, reason="no C compiler")

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+from screwkin.algebra.se3 import IDENTITY, as_array
 from screwkin.kinematics.positions import link_displacements
 from screwkin.model.dh_csv import load_dh
 from screwkin.model.table import load_robot
 from screwkin.model.urdf_in import load_urdf
-from screwkin.se3 import IDENTITY, as_array
 from tests.model.chains import fk_by_matrices
 
 

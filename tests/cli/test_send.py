@@ -19,9 +19,9 @@ from screwkin.files import read_npz
 from screwkin.model.table import load_robot
 from screwkin.servo.line import MonotonicClock
 from screwkin.servo.log import load_log
-from screwkin.servo.virtual import virtual_servos
-from screwkin.servo.virtual_bus import VirtualBus
-from screwkin.servo.virtual_terminal import PseudoTerminal
+from screwkin.servo.virtual.bus import VirtualBus
+from screwkin.servo.virtual.robot import virtual_servos
+from screwkin.servo.virtual.terminal import PseudoTerminal
 from screwkin.trajectory import load_trajectory
 
 

@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 import screwkin as sk
+from screwkin.algebra.screws import Screw
+from screwkin.algebra.se3 import IDENTITY, NO_TWIST, UNTURNED, Vector
 from screwkin.dynamics.newton_euler import Bodies, inverse_dynamics, mass_matrix
 from screwkin.errors import ShapeError
 from screwkin.model.robot import Inertia, Joint, Link
-from screwkin.screw import Screw
-from screwkin.se3 import IDENTITY, NO_TWIST, UNTURNED, Vector
 from tests.kinematics.machines import machine, random_state, random_tree
 from tests.kinematics.test_positions import bracketed
 

@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import screwkin as sk
+from screwkin.algebra.screws import Wrench, wrench_at
+from screwkin.algebra.se3 import IDENTITY, ZERO, Vector, as_array, vector_from_array
 from screwkin.dynamics.zmp import cart_table_zmp, zmp_from_wrench
 from screwkin.model.robot import Inertia, Link
 from screwkin.model.table import load_robot
-from screwkin.screw import Wrench, wrench_at
-from screwkin.se3 import IDENTITY, ZERO, Vector, as_array, vector_from_array
 from tests.kinematics.machines import machine, random_state, random_tree
 
 seeds = st.integers(0, 10_000)

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import screwkin as sk
-from screwkin.dynamics.stiffness import static_deflection
+from screwkin.compliance.stiffness import static_deflection
 from screwkin.errors import InputError, LimitError, NoSolutionError, UnknownNameError
 from screwkin.gait.compensation import compensate, convergence
 from screwkin.gait.loads import load_shares

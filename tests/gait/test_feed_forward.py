@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import screwkin as sk
-from screwkin.dynamics.stiffness import static_deflection
+from screwkin.compliance.stiffness import static_deflection
 from screwkin.gait.compensation import compensate
 from screwkin.gait.feed_forward import walking_torques
 from screwkin.gait.loads import load_shares

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from screwkin.algebra.screws import INFINITE, Screw
+from screwkin.algebra.se3 import IDENTITY, Pose, Rotation, Twist, Vector, X, Z, exp, rotate, vector_from_array
 from screwkin.kinematics.positions import link_displacements
 from screwkin.model.robot import Closure, Inertia, Joint, Limb, Link, Posture, Robot
 from screwkin.model.state import State
-from screwkin.screw import INFINITE, Screw
-from screwkin.se3 import IDENTITY, Pose, Rotation, Twist, Vector, X, Z, exp, rotate, vector_from_array
 
 TYPES = ("revolute", "revolute", "revolute", "prismatic", "helical")
 SPATIAL = ("px", "py", "pz", "rx", "ry", "rz")

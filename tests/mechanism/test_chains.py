@@ -10,7 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import screwkin as sk
+from screwkin.algebra.se3 import IDENTITY, Pose, Vector, as_array, log, vector_from_array
 from screwkin.errors import InputError
+from screwkin.kinematics.status import Status
 from screwkin.mechanism.chains import (
     NAMED,
     PLANAR,
@@ -22,10 +24,8 @@ from screwkin.mechanism.chains import (
     check_chain,
     held_pose,
 )
+from screwkin.mechanism.closure import close_loops
 from screwkin.mechanism.virtual_motion import chain_accelerations, chain_rates
-from screwkin.se3 import IDENTITY, Pose, Vector, as_array, log, vector_from_array
-from screwkin.solve.closure import close_loops
-from screwkin.solve.status import Status
 from tests.kinematics import machines
 from tests.strategies import assert_close, poses
 

@@ -8,14 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import screwkin as sk
-from screwkin.mechanism.graph import (
-    Graph,
-    circuit_matrix,
-    components,
-    cut_set_matrix,
-    incidence_matrix,
-    spanning_tree,
-)
+from screwkin.algebra.pattern import components
+from screwkin.mechanism.graph import Graph, circuit_matrix, cut_set_matrix, incidence_matrix, spanning_tree
 from screwkin.model.table import load_robot
 from tests.kinematics.machines import random_mechanism
 

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import screwkin as sk
+from screwkin.algebra.se3 import Twist, Vector, as_array, exp
 from screwkin.mechanism.choice import characteristic_length, mobility_at, normalised
 from screwkin.model.table import load_robot
-from screwkin.se3 import Twist, Vector, as_array, exp
 from tests.kinematics.machines import array_of, random_mechanism
 
 seeds = st.integers(0, 10_000)
@@ -124,8 +124,8 @@ def test_formed_at_the_worlds_origin_n_loses_digits_far_away(bioloid, distance, 
 
 def test_the_circulation_law_holds_for_any_motion_of_the_humanoid(bioloid):
     """Bodies moved by integrating twists: the couplings' rates, by differences, lie in the kernel of N."""
-    from screwkin.se3 import pose_from_array, unstack
-    from screwkin.solve.closure import coordinates_from_state
+    from screwkin.algebra.se3 import pose_from_array, unstack
+    from screwkin.mechanism.closure import coordinates_from_state
 
     mechanism = sk.closed_mechanism(bioloid)
     rng = np.random.default_rng(3)

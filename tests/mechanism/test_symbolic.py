@@ -9,12 +9,12 @@ import pytest
 import sympy
 
 import screwkin as sk
+from screwkin.algebra.se3 import UNTURNED, Pose, Vector, as_array
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.kinematics.positions import screws_in, successive_displacement
 from screwkin.mechanism.printing import print_symbolic, screw_rows, screw_table
 from screwkin.mechanism.symbolic import symbolic_limb, symbolic_loops
 from screwkin.model.table import load_robot, parse_robot
-from screwkin.se3 import UNTURNED, Pose, Vector, as_array
 
 RNG = np.random.default_rng(7)
 

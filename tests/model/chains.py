@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from screwkin.algebra.screws import INFINITE, Screw
+from screwkin.algebra.se3 import Pose, as_array, pose_from_array, vector_from_array
 from screwkin.model.dh import DHTable
-from screwkin.screw import INFINITE, Screw
-from screwkin.se3 import Pose, as_array, pose_from_array, vector_from_array
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 import sympy
 
+from screwkin.algebra.se3 import as_array, leaves
 from screwkin.model.robot import Posture, Robot
 from screwkin.model.table import load_robot
-from screwkin.se3 import as_array, leaves
 from tests.model.tables import displacements, matrix_of
 
 LEG = ("hip_yaw", "hip_roll", "hip_pitch", "knee", "ankle_pitch", "ankle_roll")

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 import sympy
 
+from screwkin.algebra.screws import INFINITE, Screw
+from screwkin.algebra.se3 import IDENTITY, Pose, Vector, X, Y, Z, as_array, leaves, vector_from_array
 from screwkin.errors import InputError, ShapeError, UnknownNameError
 from screwkin.kinematics.positions import chain_jacobian, successive_displacement
 from screwkin.model.dh import DHRow, DHTable, dh_fk, dh_frames, dh_jacobian, screws_from_dh
 from screwkin.model.dh_derive import dh_from_limb, dh_from_screws, fixed_rows
 from screwkin.model.library import robot_names
 from screwkin.model.table import load_robot
-from screwkin.screw import INFINITE, Screw
-from screwkin.se3 import IDENTITY, Pose, Vector, X, Y, Z, as_array, leaves, vector_from_array
 from tests.model.chains import fk_by_matrices, lines, next_axis, random_axis, random_chain, random_pose
 
 CONVENTIONS = ("standard", "modified")

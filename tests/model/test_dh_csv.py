@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
+from screwkin.algebra.se3 import as_array
 from screwkin.errors import TableError
 from screwkin.model.dh import screws_from_dh
 from screwkin.model.dh_csv import dh_text, load_dh, parse_dh
 from screwkin.model.dh_derive import dh_from_screws
-from screwkin.se3 import as_array
 from tests.model.chains import fk_by_matrices, lines, random_chain
 
 HEADER = "convention,joint,alpha_rad,a_m,d_m,offset_rad\n"

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from screwkin.algebra.se3 import as_array
 from screwkin.errors import InputError, TableError
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.model.dh_csv import load_dh, parse_dh
 from screwkin.model.dh_robot import robot_from_dh
 from screwkin.model.library import data_folder
 from screwkin.model.table import load_robot
-from screwkin.se3 import as_array
 from tests.model.chains import fk_by_matrices
 
 HEADER = "convention,limb,joint,type,alpha_deg,a_mm,d_mm,offset_deg\n"

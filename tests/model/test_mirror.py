@@ -11,10 +11,10 @@ import sympy
 from hypothesis import given
 from hypothesis import strategies as st
 
+from screwkin.algebra.se3 import as_array
 from screwkin.model.mirror import is_sided, swapped
 from screwkin.model.robot import Joint
 from screwkin.model.table import parse_robot
-from screwkin.se3 import as_array
 from tests.model.tables import MINI, changed, displacements, matrix_of
 
 M3, M = np.diag([1.0, -1.0, 1.0]), np.diag([1.0, -1.0, 1.0, 1.0])

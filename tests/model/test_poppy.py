@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from screwkin.algebra.se3 import as_array
 from screwkin.kinematics.mass import center_of_mass
 from screwkin.kinematics.positions import (
     chain_jacobian,
@@ -20,7 +21,6 @@ from screwkin.model.dh_derive import dh_from_limb
 from screwkin.model.library import data_folder, robot_names
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
-from screwkin.se3 import as_array
 from tests.model.chains import fk_by_matrices, lines
 
 LEG = ("hip_roll", "hip_yaw", "hip_pitch", "knee", "ankle_pitch", "ankle_roll")

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from screwkin.algebra.se3 import Vector, as_array, leaves
 from screwkin.model.robot import Closure, Posture
 from screwkin.model.table import load_robot, parse_robot
-from screwkin.se3 import Vector, as_array, leaves
 from tests.model.tables import FOURBAR, MINI, changed, matrix_of
 
 

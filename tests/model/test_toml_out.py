@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from screwkin.algebra.se3 import rotation_from_array
 from screwkin.errors import InputError
 from screwkin.model.library import robot_names
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot, parse_robot
 from screwkin.model.toml_out import robot_toml, rpy_of
-from screwkin.se3 import rotation_from_array
 from tests.model.tables import MINI
 
 

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import screwkin as sk
+from screwkin.algebra.se3 import IDENTITY, as_array
 from screwkin.errors import InputError
 from screwkin.model.robot import Closure, Robot
 from screwkin.model.urdf import link_colours, urdf_frames, urdf_from_robot
-from screwkin.se3 import IDENTITY, as_array
 
 
 @pytest.fixture(scope="module")

@@ -7,13 +7,13 @@ import pinocchio as pin
 import pytest
 from scipy.spatial.transform import Rotation
 
+from screwkin.algebra.se3 import as_array
 from screwkin.errors import TableError
 from screwkin.kinematics.positions import link_displacements
 from screwkin.model.library import robot_names
 from screwkin.model.table import load_robot
 from screwkin.model.urdf import urdf_from_robot
 from screwkin.model.urdf_in import load_urdf, parse_urdf
-from screwkin.se3 import as_array
 
 ARM = """<?xml version="1.0"?>
 <robot name="arm">

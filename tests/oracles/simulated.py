@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import screwkin as sk
+from screwkin.algebra.se3 import as_array
 from screwkin.model.robot import Robot
 from screwkin.model.urdf import urdf_frames
-from screwkin.se3 import as_array
 from tests.kinematics.machines import random_tree
 
 STATES = 100

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from screwkin.algebra.se3 import as_array
 from screwkin.analysis.ik_others import pinocchio_clik, pinocchio_model
 from screwkin.analysis.ik_targets import random_targets, walking_path, walking_targets
+from screwkin.ik.numeric import IkSettings, solve_limb
+from screwkin.kinematics.serial_chain import Chain
 from screwkin.model.table import load_robot
-from screwkin.se3 import as_array
-from screwkin.solve.chain import Chain
-from screwkin.solve.ik import IkSettings, solve_limb
-from tests.solve.legs import apart
+from tests.ik.legs import apart
 
 pin = pytest.importorskip("pinocchio")
 

@@ -93,8 +93,8 @@ def test_a_failed_simulation_tells_every_reason(account, check, tmp_path):
 
 
 def test_fast_joints_are_told_once_although_plan_and_simulation_warn(robot, tmp_path):
+    from screwkin.analysis.account import account_of
     from screwkin.analysis.validate import validate
-    from screwkin.report.account import account_of
 
     hasty = sk.walk(robot, sk.load_gait("walk").replace(Tc=0.5), steps=1)
     words = page(tmp_path / "r.html", account_of(robot, hasty), [], validate(robot, hasty, "kinematic")).words

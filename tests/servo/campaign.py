@@ -40,8 +40,8 @@ from screwkin.gait.files import load_gait
 from screwkin.gait.walk import walk
 from screwkin.model.table import load_robot
 from screwkin.model.toml_out import robot_toml
-from screwkin.servo.virtual_bus import VirtualBus
-from screwkin.servo.virtual_trouble import KINDS, Trouble
+from screwkin.servo.virtual.bus import VirtualBus
+from screwkin.servo.virtual.faults import KINDS, Trouble
 from screwkin.trajectory import load_trajectory
 
 OTHERS = ("stalled", "interrupted")

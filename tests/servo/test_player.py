@@ -20,9 +20,9 @@ from screwkin.servo.gate import Bounds
 from screwkin.servo.player import Player, PlaySettings, describe, frames_of
 from screwkin.servo.profiles import load_profile
 from screwkin.servo.servo_map import ServoMap
-from screwkin.servo.virtual_bus import SimulatedClock, VirtualBus
-from screwkin.servo.virtual_servo import VirtualServo
-from screwkin.servo.virtual_trouble import Trouble
+from screwkin.servo.virtual.bus import SimulatedClock, VirtualBus
+from screwkin.servo.virtual.faults import Trouble
+from screwkin.servo.virtual.servo import VirtualServo
 from screwkin.trajectory import Trajectory
 
 ROBOT = load_robot("bioloid")

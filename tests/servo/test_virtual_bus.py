@@ -15,11 +15,11 @@ from screwkin.servo.packets import Packet
 from screwkin.servo.profiles import load_profile, radians_from_ticks
 from screwkin.servo.protocols import codec
 from screwkin.servo.servo_map import ServoMap
-from screwkin.servo.virtual import virtual_servos
-from screwkin.servo.virtual_body import follow
-from screwkin.servo.virtual_bus import SimulatedClock, VirtualBus
-from screwkin.servo.virtual_servo import VirtualServo
-from screwkin.servo.virtual_trouble import KINDS, Trouble
+from screwkin.servo.virtual.body import follow
+from screwkin.servo.virtual.bus import SimulatedClock, VirtualBus
+from screwkin.servo.virtual.faults import KINDS, Trouble
+from screwkin.servo.virtual.robot import virtual_servos
+from screwkin.servo.virtual.servo import VirtualServo
 
 AX = load_profile("AX-12A")
 MX = load_profile("MX-28-2")

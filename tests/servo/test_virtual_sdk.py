@@ -13,10 +13,10 @@ import dynamixel_sdk as sdk
 import pytest
 
 from screwkin.servo.profiles import Profile, load_profile
-from screwkin.servo.virtual_bus import VirtualBus
-from screwkin.servo.virtual_servo import VirtualServo
-from screwkin.servo.virtual_terminal import PseudoTerminal
-from screwkin.servo.virtual_trouble import Trouble
+from screwkin.servo.virtual.bus import VirtualBus
+from screwkin.servo.virtual.faults import Trouble
+from screwkin.servo.virtual.servo import VirtualServo
+from screwkin.servo.virtual.terminal import PseudoTerminal
 
 pytestmark = pytest.mark.realtime
 

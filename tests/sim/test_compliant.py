@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import screwkin as sk
-from screwkin.dynamics.stiffness import static_deflection
+from screwkin.compliance.stiffness import static_deflection
 from screwkin.errors import InputError
 from screwkin.model.robot import Robot
 from screwkin.sim.backend import Command, Observation

@@ -10,10 +10,10 @@ import pytest
 from PIL import Image
 
 import screwkin as sk
+from screwkin.algebra.se3 import Vector
 from screwkin.errors import OutputError
 from screwkin.model.robot import Box, Link, Robot
 from screwkin.model.urdf import ORANGE, SLATE, WHITE
-from screwkin.se3 import Vector
 from screwkin.sim.camera import Camera, Picture, following, save_gif, save_png, view_of
 from screwkin.sim.render import pictures
 

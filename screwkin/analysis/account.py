@@ -1,0 +1,195 @@
+"""All there is to tell about a trajectory: its balance, closure, singularity, and use of its servos."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import as_array, pose_from_array, unstack
+from screwkin.errors import TableError, TrajectoryError
+from screwkin.gait.balance import Balance, zmp
+from screwkin.gait.intended import intended
+from screwkin.kinematics.positions import frame_pose, link_displacements
+from screwkin.kinematics.status import SINGULAR
+from screwkin.mechanism.choice import closed_mechanism
+from screwkin.mechanism.network import coupling_twists, network_matrix
+from screwkin.mechanism.rates import block_name, singular_values
+from screwkin.mechanism.singularity import LimbSingularity, singularity_report
+from screwkin.model.robot import Robot
+from screwkin.model.table import parse_robot
+from screwkin.trajectory import Trajectory
+
+_SAME_ZMP = 1e-6  # m: what other versions' rounding may change
+_COARSE = 0.1  # s between samples: a step of a second would be told by ten
+
+
+@dataclass(frozen=True, eq=False)
+class Account:
+    """A trajectory and what follows from it, computed anew from its positions, rates and accelerations."""
+
+    robot: Robot
+    trajectory: Trajectory
+    motion: Trajectory
+    """What the robot is to do: the trajectory itself, unless its joints are compensated commands."""
+    balance: Balance
+    sigma: Mapping[str, Array]
+    """Least length-normalised singular value (T,) of every limb."""
+    limbs: tuple[LimbSingularity, ...]
+    """The least regular sample of every limb, with its cause."""
+
+    @cached_property
+    def closure(self) -> Mapping[str, tuple[float, float]]:
+        """For every tip: largest distance [m] and angle [rad] from where the joints carry it."""
+        T = pose_from_array(self.trajectory.T_world_base)
+        D = link_displacements(self.robot, unstack(self.motion.q))
+        errors = {}
+        for tip, told in self.trajectory.T_world_tip.items():
+            reached = as_array(T @ frame_pose(self.robot, D, tip), (self.trajectory.samples,))
+            gap = float(np.linalg.norm(reached[:, :3, 3] - told[:, :3, 3], axis=1).max())
+            errors[tip] = (gap, float(_angle(reached[:, :3, :3], told[:, :3, :3]).max()))
+        return errors
+
+    @property
+    def max_closure(self) -> float:
+        """Largest closure error [m and rad]: of this trajectory, and of the solution that made it."""
+        solved = self.trajectory.meta.get("closure")
+        told = [float(solved)] if isinstance(solved, int | float) else []
+        return max([value for errors in self.closure.values() for value in errors] + told, default=0.0)
+
+    @property
+    def singular_samples(self) -> int:
+        """Number of samples with a singular limb."""
+        values = list(self.sigma.values())
+        return int((np.min(values, axis=0) < SINGULAR).sum()) if values else 0
+
+    @property
+    def outside(self) -> Array:
+        """Samples (T,) whose ZMP lies outside the support polygon, or where the ground would have to pull."""
+        return (self.balance.margin < 0.0) | self.pulled
+
+    @property
+    def pulled(self) -> Array:
+        """Samples (T,) at which the floor would have to hold the robot down: there is no ZMP there."""
+        return np.asarray(self.balance.wrench[:, 5] <= 0.0)
+
+    @property
+    def boundaries(self) -> tuple[float, ...]:
+        """Times at which steps begin and end [s], as the trajectory tells them."""
+        times = self.trajectory.meta.get("boundaries")
+        sound = isinstance(times, list) and all(isinstance(t, int | float) for t in times)
+        return tuple(map(float, times)) if isinstance(times, list) and sound else ()
+
+    @property
+    def steps(self) -> int | None:
+        """Number of steps, if the trajectory tells it."""
+        steps = self.trajectory.meta.get("steps")
+        return steps if isinstance(steps, int) else None
+
+    @cached_property
+    def speed_use(self) -> Mapping[str, float]:
+        """For every joint: its largest speed as a share of its limit; 0 where there is none."""
+        fastest = np.abs(self.trajectory.qd).max(axis=0)
+        return {
+            joint.name: float(speed / joint.velocity)
+            for joint, speed in zip(self.robot.joints, fastest, strict=True)
+        }
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What works on paper, but not on the servos or not for long."""
+        fast = [
+            f"{joint.name} {share * joint.velocity:.1f} of {joint.velocity:.1f} rad/s"
+            for joint in self.robot.joints
+            if (share := self.speed_use[joint.name]) > 1.0
+        ]
+        # In the words of a simulation's own warning, so that a page tells it once.
+        found = [f"planned joint speed above the servo's: {', '.join(fast)}"] if fast else []
+        gap = float(np.diff(self.trajectory.time).max())
+        if gap > _COARSE:
+            found.append(f"samples are {gap:.3g} s apart; margins and spikes between them are not seen")
+        if self.pulled.any():
+            when = self.trajectory.time[int(self.pulled.argmax())]
+            found.append(f"the robot would leave the floor at {when:.2f} s: no ZMP exists there")
+        near = [
+            f"{limb.limb} comes near a singularity at {self.trajectory.time[limb.sample]:.2f} s: {limb.cause}"
+            for limb in self.limbs
+            if limb.near
+        ]
+        wrong = float(np.abs(self.balance.zmp - self.trajectory.zmp).max())
+        changed = (
+            [f"the recorded ZMP differs from the one computed anew by up to {1e3 * wrong:.3g} mm"]
+            if wrong > _SAME_ZMP
+            else []
+        )
+        notes = self.trajectory.meta.get("notes")
+        return (*found, *near, *changed, *(map(str, notes) if isinstance(notes, list) else ()))
+
+
+def account_of(robot: Robot, trajectory: Trajectory) -> Account:
+    """The account of a trajectory of that robot.
+
+    Raises:
+        InputError: joints or tips are not the robot's, or a foot has no sole. TrajectoryError: rates or
+            accelerations so large that no forces can be computed.
+    """
+    _check_tips(robot, trajectory)
+    with np.errstate(over="ignore", invalid="ignore"):
+        motion = intended(robot, trajectory)
+        balance = zmp(robot, motion)
+    finite = np.isfinite(np.hstack([balance.wrench, balance.zmp])).all(axis=1)
+    if not finite.all():
+        raise TrajectoryError(
+            f"no finite ground wrench in sample {int(finite.argmin())}: "
+            "positions, rates or accelerations are beyond reason"
+        )
+    mechanism = closed_mechanism(robot)
+    T = pose_from_array(trajectory.T_world_base)
+    twists = coupling_twists(mechanism, T.R, unstack(motion.q))
+    N = network_matrix(mechanism, twists, (trajectory.samples,))
+    sigma = singular_values(mechanism, N)
+    names = [block_name(mechanism, circuits) for circuits, _ in mechanism.blocks]
+    by_limb = {name: sigma[:, i] for i, name in enumerate(names)}
+    return Account(robot, trajectory, motion, balance, by_limb, singularity_report(mechanism, N))
+
+
+def recorded_robot(trajectory: Trajectory, path: str = "the trajectory") -> Robot:
+    """The robot that a trajectory was made for, from the table in its own ``meta``.
+
+    Raises:
+        TrajectoryError: the table is not there, damaged, or not the one that its SHA-256 tells.
+    """
+    told = trajectory.meta.get("robot")
+    text = told.get("table") if isinstance(told, dict) else None
+    if not isinstance(told, dict) or not isinstance(text, str):
+        raise TrajectoryError(f"{path}: meta holds no robot table; make it again with: screwkin walk")
+    if hashlib.sha256(text.encode()).hexdigest() != told.get("sha256"):
+        raise TrajectoryError(
+            f"{path}: the robot table in meta is not the one whose SHA-256 stands beside it; it was changed "
+            "after the trajectory was made. Make it again with: screwkin walk"
+        )
+    try:
+        return parse_robot(text, f"{path}, robot table")
+    except TableError as error:
+        raise TrajectoryError(f"{path}: its robot table is not readable by this version: {error}") from None
+
+
+def _check_tips(robot: Robot, trajectory: Trajectory) -> None:
+    if not trajectory.feet:
+        raise TrajectoryError("the trajectory names no feet; a ZMP needs soles on the floor")
+    strange = [tip for tip in trajectory.T_world_tip if tip not in robot.tip_names]
+    if strange:
+        raise TrajectoryError(
+            f"the trajectory has the tips {', '.join(strange)}; {robot.name} has {', '.join(robot.tip_names)}"
+        )
+
+
+def _angle(A: Array, B: Array) -> Array:
+    """Angle (T,) between rotations [rad], exact for small ones."""
+    R = A @ B.swapaxes(-1, -2)
+    twice_sine = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
+    return np.asarray(np.arctan2(np.linalg.norm(twice_sine, axis=1), np.trace(R, axis1=1, axis2=2) - 1.0))

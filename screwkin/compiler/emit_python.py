@@ -1,0 +1,125 @@
+"""Programs as plain Python for one sample, and as NumPy for a batch: what needs no compiler."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from screwkin.algebra.arrays import Array
+from screwkin.compiler.program import Operand, Program, Step
+
+BLOCK = 4096
+"""Samples that ``run_numpy`` computes together: many for what a call costs, few for the cache."""
+
+_TEXT = {
+    "add": "({} + {})",
+    "sub": "({} - {})",
+    "mul": "{} * {}",
+    "neg": "-{}",
+    "rcp": "(1.0 / {})",
+    "lt": "({} < {})",
+    "le": "({} <= {})",
+    "and": "({} and {})",
+    "or": "({} or {})",
+    "not": "(not {})",
+    "where": "({1} if {0} else {2})",
+}
+
+
+def source(program: Program) -> str:
+    """A module with one function: flat sequences of floats in, one list of floats for every output.
+
+    A value that is used once stands inside the expression that uses it, which saves the interpreter its name.
+    """
+    uses = Counter(x for step in program.steps for x in step.operands if isinstance(x, int))
+    uses.update(x for x in program.results if isinstance(x, int))
+    text: dict[int, str] = {}
+    depth: dict[int, int] = {}
+    lines = [repr(f"Made by screwkin from a screw table: {program.about}"), ""]
+    lines += ["from math import atan2, cos, inf, nan, sin, sqrt", "", ""]
+    lines.append(f"def {program.name}({', '.join(group.name for group in program.inputs)}):")
+    at = 0
+    for group in program.inputs:
+        names = [f"v{at + k}" for k in range(group.size)]
+        if names:
+            lines.append(f"    ({', '.join(names)},) = {group.name}")
+        text.update({at + k: name for k, name in enumerate(names)})
+        at += group.size
+
+    def told(x: Operand) -> str:
+        return text[x] if isinstance(x, int) else repr(x)
+
+    for k, step in enumerate(program.steps):
+        operands = [told(x) for x in step.operands]
+        form = _TEXT.get(step.operation, step.operation + "({}" + ", {}" * (len(operands) - 1) + ")")
+        value, deep = (
+            form.format(*operands),
+            1 + max((depth.get(x, 0) for x in step.operands if isinstance(x, int)), default=0),
+        )
+        if uses[at + k] == 1 and deep < 20:
+            text[at + k] = f"({value})" if step.operation in ("mul", "neg") else value
+            depth[at + k] = deep
+        else:
+            lines.append(f"    v{at + k} = {value}")
+            text[at + k] = f"v{at + k}"
+    results = iter(program.results)
+    lists = [f"[{', '.join(told(next(results)) for _ in range(group.size))}]" for group in program.outputs]
+    lines.append(f"    return {', '.join(lists)}" + ("," if len(lists) == 1 else ""))
+    return "\n".join(lines) + "\n"
+
+
+_ARRAY: Mapping[str, Callable[..., Any]] = {
+    "add": np.add,
+    "sub": np.subtract,
+    "mul": np.multiply,
+    "neg": np.negative,
+    "rcp": np.reciprocal,
+    "sqrt": np.sqrt,
+    "sin": np.sin,
+    "cos": np.cos,
+    "atan2": np.arctan2,
+    "lt": np.less,
+    "le": np.less_equal,
+    "and": np.logical_and,
+    "or": np.logical_or,
+    "not": np.logical_not,
+    "where": np.where,
+}
+
+
+def run_numpy(program: Program, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
+    """Compute a batch, block by block: flat inputs (B, size) to flat outputs (B, size), which are filled."""
+    last = _last_uses(program)
+    for begin in range(0, len(outputs[0]), BLOCK):
+        here = slice(begin, begin + BLOCK)
+        values: list[Any] = [row for array in inputs for row in np.ascontiguousarray(array[here].T)]
+        with np.errstate(all="ignore"):  # branches that are not chosen may divide by zero
+            _run_steps(program.steps, values, last)
+        results = iter(program.results)
+        for array in outputs:
+            for k in range(array.shape[1]):
+                x = next(results)
+                array[here, k] = values[x] if isinstance(x, int) else x
+
+
+def _run_steps(steps: Sequence[Step], values: list[Any], last: Sequence[Sequence[int]]) -> None:
+    for step, spent in zip(steps, last, strict=True):
+        values.append(
+            _ARRAY[step.operation](*(values[x] if isinstance(x, int) else x for x in step.operands))
+        )
+        for x in spent:
+            values[x] = None
+
+
+def _last_uses(program: Program) -> list[list[int]]:
+    """For every step the values that nothing needs after it: their memory serves again while it is warm."""
+    seen = {x for x in program.results if isinstance(x, int)}
+    last: list[list[int]] = []
+    for step in reversed(program.steps):
+        spent = [x for x in dict.fromkeys(step.operands) if isinstance(x, int) and x not in seen]
+        seen.update(spent)
+        last.append(spent)
+    return last[::-1]

@@ -1,0 +1,1 @@
+"""Elastic joints: how a robot deflects under its weight (virtual joint method)."""

@@ -1,0 +1,1 @@
+"""A robot's programs as files for other software."""

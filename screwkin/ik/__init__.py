@@ -1,0 +1,1 @@
+"""Inverse kinematics: closed forms and numeric methods, of one limb and of the whole body."""

@@ -1,0 +1,63 @@
+"""Turns about known axes that take known vectors where they belong: the bricks of every closed-form limb.
+
+Formulas on any scalar. Where a wanted place is out of reach the turn that comes nearest is given.
+
+Source: Paden (1986), Kahan; in the form of Elias and Wen (2025), "IK-Geo", for axes of any directions.
+"""
+
+from __future__ import annotations
+
+from screwkin.algebra.scalar import Scalar, atan2, is_symbolic, minus, plus, root, sqrt, times, where
+from screwkin.algebra.se3 import Rotation, Vector, cross, dot, rotate
+
+
+def turn_onto(s: Vector, a: Vector, b: Vector) -> Scalar:
+    """Angle about the unit vector s that takes a nearest to b."""
+    return atan2(dot(s, cross(a, b)), minus(dot(a, b), times(dot(s, a), dot(s, b))))
+
+
+def turns_to_level(s: Vector, a: Vector, m: Vector, level: Scalar) -> tuple[Scalar, Scalar]:
+    """The two angles about s at which a, turned, has the scalar product ``level`` with m.
+
+    Out of reach both are the angle of the largest or smallest product.
+    """
+    return level_turns(s, a, m, level)[:2]
+
+
+def level_turns(s: Vector, a: Vector, m: Vector, level: Scalar) -> tuple[Scalar, Scalar, Scalar]:
+    """The angles of ``turns_to_level``, and how far inside reach they are.
+
+    That slack is 1 at best, 0 where both angles are one or none is determined, negative out of reach.
+    """
+    fixed = times(dot(m, s), dot(s, a))
+    along, across, wanted = minus(dot(m, a), fixed), dot(m, cross(s, a)), minus(level, fixed)
+    size = sqrt(plus(times(along, along), times(across, across)))
+    square = times(minus(size, wanted), plus(size, wanted))
+    middle = atan2(across, along)
+    aside = atan2(root(square), wanted)
+    whole = times(dot(a, a), dot(m, m))
+    return (
+        middle + aside,
+        middle - aside,
+        square / (whole if is_symbolic(whole) else where(whole > 0, whole, 1.0)),
+    )
+
+
+def two_turns(s1: Vector, s2: Vector, a: Vector, b: Vector) -> list[tuple[Scalar, Scalar, Scalar]]:
+    """Both pairs of angles with R(s1) R(s2) a = b, for vectors of one length, and their slack."""
+    *seconds, slack = level_turns(s2, a, s1, dot(s1, b))
+    return [(turn_onto(s1, rotate(s2, second) @ a, b), second, slack) for second in seconds]
+
+
+def three_turns(
+    s1: Vector, s2: Vector, s3: Vector, R: Rotation
+) -> list[tuple[Scalar, Scalar, Scalar, Scalar]]:
+    """Both triples of angles with R(s1) R(s2) R(s3) = R, neighbouring axes not parallel, and their slack.
+
+    Where s1 and the turned s3 fall together only the sum or difference of first and third is determined.
+    """
+    triples = []
+    for first, second, slack in two_turns(s1, s2, s3, R @ s3):
+        rest = (rotate(s1, first) @ rotate(s2, second)).T @ R
+        triples.append((first, second, turn_onto(s3, s2, rest @ s2), slack))
+    return triples

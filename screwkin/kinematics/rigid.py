@@ -1,0 +1,72 @@
+"""Kernel of matrices that shall be poses: how far they are from one, and the nearest."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.scalar import Scalar, abs_, where
+from screwkin.algebra.se3 import Pose, Rotation, Vector, cross, dot
+from screwkin.compiler.program import Program, Recorder
+from screwkin.compiler.records import matrix
+from screwkin.compiler.run import python_function, run
+from screwkin.model.state import RIGID
+
+
+def foreign(T: Array) -> Array:
+    """Which of the matrices (..., 4, 4) are no rigid displacements (...,)."""
+    if T.ndim == 2:  # what a loop over samples asks: without the cost of arrays
+        ((deviation,),) = python_function(poses(False))(T.ravel().tolist())
+        return np.asarray(deviation > RIGID)
+    return run(poses(False), {"T": T})["deviation"][..., 0] > RIGID
+
+
+def nearest_poses(T: Array) -> tuple[Array, Array]:
+    """How far matrices (..., 4, 4) are from poses (...,), and poses with exact rotations.
+
+    The distance is that of ``poses``; rotations are exact to the last digit.
+    """
+    found = run(poses(True), {"T": T})
+    return found["deviation"][..., 0], found["pose"]
+
+
+@cache
+def poses(exact: bool) -> Program:
+    """Largest entry of R^T R - 1 and of the last row's difference from 0 0 0 1; infinite if left-handed.
+
+    Args:
+        exact: give also the pose with the nearest rotation, by two steps of Newton's method, each of which
+            squares the error (Higham 1986).
+    """
+    recorder = Recorder("exact_poses" if exact else "poses", "How far a matrix is from a pose.")
+    T = recorder.input("T", 4, 4)
+    R = Rotation(*(Vector(*T[c:12:4]) for c in range(3)))
+    gram = _gram(R)
+    entries = [gram[0] - 1, gram[1] - 1, gram[2] - 1, *gram[3:], *T[12:15], T[15] - 1]
+    worst: Scalar = 0.0
+    for entry in map(abs_, entries):
+        worst = where(entry > worst, entry, worst)
+    recorder.output("deviation", [where(dot(R.x, cross(R.y, R.z)) > 0.0, worst, math.inf)])
+    if exact:
+        recorder.output("pose", matrix(Pose(_nearer(_nearer(R)), Vector(*T[3:12:4]))), 4, 4)
+    return recorder.program()
+
+
+def _gram(R: Rotation) -> list[Scalar]:
+    """Entries of R^T R: xx, yy, zz, xy, yz, zx."""
+    x, y, z = R.x, R.y, R.z
+    return [dot(x, x), dot(y, y), dot(z, z), dot(x, y), dot(y, z), dot(z, x)]
+
+
+def _nearer(R: Rotation) -> Rotation:
+    """R (3 - R^T R) / 2."""
+    x, y, z = R.x, R.y, R.z
+    xx, yy, zz, xy, yz, zx = (0.5 * entry for entry in _gram(R))
+    return Rotation(
+        x * (1.5 - xx) - y * xy - z * zx,
+        y * (1.5 - yy) - z * yz - x * xy,
+        z * (1.5 - zz) - x * zx - y * yz,
+    )

@@ -1,0 +1,206 @@
+"""Positions of any closed mechanism: Newton's method through the network matrix.
+
+Coordinates are those of the couplings, virtual ones included, so any choice of primary couplings may be
+imposed: the position of a four-bar's crank, the legs of a platform, a foot while the waist follows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.newton import newton
+from screwkin.algebra.scalar import Scalar
+from screwkin.algebra.screws import at
+from screwkin.algebra.se3 import (
+    IDENTITY,
+    UNTURNED,
+    ZERO,
+    Pose,
+    Twist,
+    as_array,
+    pose_from_array,
+    rotation_log,
+    unstack,
+)
+from screwkin.errors import InputError, NoSolutionError, UnknownNameError
+from screwkin.kinematics.positions import frame_pose, link_displacements
+from screwkin.kinematics.status import CLOSED, SINGULAR, Status
+from screwkin.mechanism.chains import chain_coordinates, chain_pose
+from screwkin.mechanism.choice import characteristic_length
+from screwkin.mechanism.mechanism import Mechanism, coupling_graph, virtual_chains
+from screwkin.mechanism.network import coupling_twists, network_matrix
+from screwkin.model.robot import Robot
+from screwkin.model.state import State
+
+
+@dataclass(frozen=True, eq=False)
+class ClosureSolution:
+    """Closed positions of a batch.
+
+    Attributes:
+        state: T_world_base (..., 4, 4) and q (..., n).
+        coordinates: (..., couplings) [m, rad].
+        status: (...,) ``Status`` values.
+        residual: (...,) closure error [m and rad, norm].
+        iterations: (...,).
+    """
+
+    state: State
+    coordinates: Array
+    status: Array
+    residual: Array
+    iterations: Array
+
+
+def coordinates_from_state(mechanism: Mechanism, T: Pose, q: Sequence[Scalar]) -> list[Scalar]:
+    """Coordinates of all couplings at a state; virtual chains reach their bodies."""
+    robot = mechanism.robot
+    D = link_displacements(robot, q)
+    values = dict(zip(robot.joint_names, q, strict=True))
+    for chain in mechanism.chains:
+        body = T if chain.limb is None else T @ frame_pose(robot, D, chain.limb.tip)
+        coordinates = chain_coordinates(chain.couplings, body, mechanism.held(chain, T))
+        values |= zip(chain.names, coordinates, strict=True)
+    return [values[name] for name in mechanism.couplings]
+
+
+def base_pose(mechanism: Mechanism, coordinates: Sequence[Scalar], fixed: Pose) -> Pose:
+    """Pose of the base told by the waist's chain, or the fixed one."""
+    for chain in mechanism.chains:
+        if chain.limb is None:
+            return chain_pose(chain.couplings, [coordinates[mechanism.position[n]] for n in chain.names])
+    return fixed
+
+
+def closure_errors(mechanism: Mechanism, coordinates: Sequence[Scalar], fixed: Pose) -> list[Twist]:
+    """What separates the ends of every closing, as small twists about the base origin, world axes.
+
+    A twist moves end a onto end b; all are zero when the mechanism is closed.
+    """
+    robot = mechanism.robot
+    q = [coordinates[mechanism.position[name]] for name in robot.joint_names]
+    base = base_pose(mechanism, coordinates, fixed)
+    D = link_displacements(robot, q)
+    carried = dict(zip(robot.link_names, D, strict=True))
+    ends: list[tuple[Pose, Pose]] = []
+    for chain in mechanism.chains:
+        if chain.limb is not None:
+            values = [coordinates[mechanism.position[name]] for name in chain.names]
+            end = chain_pose(chain.couplings, values, mechanism.held(chain, base))
+            ends.append((base @ frame_pose(robot, D, chain.limb.tip), end))
+    for closure in robot.closures:
+        a, b = carried[closure.link_a] @ closure.frame_a, carried[closure.link_b] @ closure.frame_b
+        ends.append((base @ a, base @ b))
+    errors = []
+    for a, b in ends:
+        gap = Twist(rotation_log(b.R @ a.R.T), b.p - a.p)
+        errors.append(at(base.p - a.p, gap))
+    return errors
+
+
+def close_loops(mechanism: Mechanism, guess: State, imposed: Mapping[str, Array]) -> ClosureSolution:
+    """Positions at which all loops close, for imposed coordinates of primary couplings.
+
+    Args:
+        mechanism: its primary couplings keep the guess's coordinates, or get those imposed.
+        guess: a state near the solution, batched or not.
+        imposed: coordinate (...,) [rad or m] by primary coupling.
+
+    Returns:
+        ClosureSolution; nothing is raised for samples without solution.
+
+    Raises:
+        UnknownNameError: a name is no coupling. InputError: it is secondary.
+    """
+    for name in imposed:
+        if name not in mechanism.position:
+            raise UnknownNameError("coupling", name, mechanism.couplings)
+        if name in mechanism.secondary:
+            raise InputError(f"{name} is secondary and follows; impose primary couplings only")
+    T, q = np.asarray(guess.T_world_base, dtype=float), np.asarray(guess.q, dtype=float)
+    values = {name: np.asarray(value, dtype=float) for name, value in imposed.items()}
+    batch = np.broadcast_shapes(T.shape[:-2], q.shape[:-1], *(v.shape for v in values.values()))
+    count, columns = int(np.prod(batch)), mechanism.secondary_columns
+    flat_T = np.broadcast_to(T, (*batch, 4, 4)).reshape(count, 4, 4)
+    flat_q = np.broadcast_to(q, (*batch, q.shape[-1])).reshape(count, -1)
+    x = as_array(coordinates_from_state(mechanism, pose_from_array(flat_T), unstack(flat_q)), (count,))
+    for name, value in values.items():
+        x[:, mechanism.position[name]] = np.broadcast_to(value, batch).reshape(count)
+
+    length = characteristic_length(mechanism.robot)
+    scale = np.tile([1.0, 1.0, 1.0, 1 / length, 1 / length, 1 / length], len(mechanism.closings))
+
+    def residual(secondary: Array, samples: Array) -> tuple[Array, Array]:
+        full = x[samples]
+        full[:, columns] = secondary
+        scalars, fixed = unstack(full), pose_from_array(flat_T[samples])
+        missing = as_array(closure_errors(mechanism, scalars, fixed), (len(samples),)).reshape(
+            len(samples), -1
+        )
+        joints = [scalars[mechanism.position[name]] for name in mechanism.robot.joint_names]
+        turned = base_pose(mechanism, scalars, fixed).R
+        twists = coupling_twists(mechanism, turned, joints, ZERO)
+        N = network_matrix(mechanism, twists, (len(samples),), mechanism.closing_matrix)
+        return missing * scale, N[..., columns] * scale[:, None]
+
+    result = newton(residual, x[:, columns])
+    x[:, columns] = result.x
+    _, Ns = residual(result.x, np.arange(count))
+    sigma = np.linalg.svd(Ns, compute_uv=False)[:, len(columns) - 1]
+    closed = result.residual * max(1.0, length) <= CLOSED
+    status = np.where(
+        closed, np.where(sigma < SINGULAR, Status.SINGULAR, Status.CONVERGED), Status.UNREACHABLE
+    )
+    status = np.where(
+        (status == Status.CONVERGED) & _beyond_limits(mechanism, x), Status.OUT_OF_LIMITS, status
+    )
+    poses = as_array(base_pose(mechanism, unstack(x), pose_from_array(flat_T)), (count,))
+    joints = x[:, [mechanism.position[name] for name in mechanism.robot.joint_names]]
+    return ClosureSolution(
+        State(poses.reshape(*batch, 4, 4), joints.reshape(*batch, -1)),
+        x.reshape(*batch, -1),
+        status.reshape(batch),
+        result.residual.reshape(batch),
+        result.iterations.reshape(batch),
+    )
+
+
+def nearest_closed(robot: Robot, q: Array) -> Array:
+    """Joint positions (n,) near q at which every closure of a table closes: for a posture written by eye.
+
+    Raises:
+        NoSolutionError: none is found from there; the message tells the gap that is left.
+    """
+    single = replace(robot, limbs=())
+    chains = virtual_chains(single)
+    graph = coupling_graph(single, chains)
+    mechanism = Mechanism(single, chains, graph, (), tuple(name for name, _, _ in graph.edges), 0)
+    order = [mechanism.position[name] for name in robot.joint_names]
+    length = characteristic_length(robot)
+    scale = np.tile([1.0, 1.0, 1.0, 1 / length, 1 / length, 1 / length], len(mechanism.closings))
+
+    def residual(joints: Array, samples: Array) -> tuple[Array, Array]:
+        full = np.zeros((len(joints), len(mechanism.couplings)))
+        full[:, order] = joints
+        missing = as_array(closure_errors(mechanism, unstack(full), IDENTITY), (len(joints),))
+        twists = coupling_twists(mechanism, UNTURNED, unstack(joints))
+        N = network_matrix(mechanism, twists, (len(joints),), mechanism.closing_matrix)
+        return missing.reshape(len(joints), -1) * scale, N[..., order] * scale[:, None]
+
+    result = newton(residual, np.asarray(q, dtype=float)[None])
+    if result.residual[0] > CLOSED:
+        raise NoSolutionError(
+            f"{robot.name}: no closed posture near this one; {result.residual[0]:.3g} is left"
+        )
+    return result.x[0]
+
+
+def _beyond_limits(mechanism: Mechanism, x: Array) -> Array:
+    joints = mechanism.robot.joints
+    q = x[:, [mechanism.position[joint.name] for joint in joints]]
+    lower, upper = np.array([j.lower for j in joints]), np.array([j.upper for j in joints])
+    return np.asarray(((q < lower - 1e-9) | (q > upper + 1e-9)).any(axis=1))

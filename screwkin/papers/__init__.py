@@ -1,0 +1,1 @@
+"""What the two papers print, measured again: tables, figures and the page that compares."""

@@ -1,0 +1,79 @@
+"""The bench on which a paper's measures are taken: every robot, walk and study is made once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
+
+from screwkin.analysis.account import Account, account_of
+from screwkin.analysis.compare import Comparison, compare_models
+from screwkin.analysis.engines import Yielding
+from screwkin.analysis.facts import Facts, facts_of
+from screwkin.analysis.validate import Validation, validate
+from screwkin.gait.files import load_gait
+from screwkin.gait.record import Gait
+from screwkin.gait.walk import walk
+from screwkin.model.robot import Robot
+from screwkin.model.table import load_robot
+
+Made = TypeVar("Made")
+
+
+Changes = Mapping[str, str | float]
+
+
+class Bench:
+    """What measures share.
+
+    ``robot`` is the paper's, meant wherever a measure names none; ``changes`` are made to every gait first.
+    """
+
+    def __init__(self, robot: str, changes: Changes | None = None) -> None:
+        self._default = robot
+        self._changes = dict(changes or {})
+        self._made: dict[tuple[object, ...], Any] = {}
+
+    def once(self, key: tuple[object, ...], make: Callable[[], Made]) -> Made:
+        """What ``make`` gives, made at the first call for a key."""
+        if key not in self._made:
+            self._made[key] = make()
+        found: Made = self._made[key]
+        return found
+
+    def robot(self, name: str = "") -> Robot:
+        """A robot; the paper's if no name is given."""
+        chosen = name or self._default
+        return self.once(("robot", chosen), lambda: load_robot(chosen))
+
+    def facts(self, robot: str = "") -> Facts:
+        """Counts and conditioning of a robot's closed mechanism at home."""
+        table = self.robot(robot)
+        return self.once(("facts", table.name), lambda: facts_of(table))
+
+    def account(
+        self,
+        gait: str,
+        steps: int | None = None,
+        robot: str = "",
+        changes: Changes | None = None,
+    ) -> Account:
+        """A walk and its balance."""
+        table = self.robot(robot)
+        key = ("account", table.name, gait, steps, *sorted((changes or {}).items()))
+        return self.once(key, lambda: account_of(table, walk(table, self.gait(gait, changes), steps)))
+
+    def gait(self, name: str, changes: Changes | None = None) -> Gait:
+        """A gait as the paper walks it, with further changes."""
+        changed = {**self._changes, **(changes or {})}
+        return load_gait(name).replace(**changed) if changed else load_gait(name)
+
+    def validation(self, account: Account, sole_stiffness: float | None = None) -> Validation:
+        """The verdict of the simulator on a walk, with rigid soles or elastic ones [N/m]."""
+        trajectory, gives = account.trajectory, Yielding(sole_stiffness=sole_stiffness)
+        key = ("validation", trajectory.sha256, sole_stiffness)
+        return self.once(key, lambda: validate(account.robot, trajectory, gives=gives))
+
+    def comparison(self, robot: str = "") -> Comparison:
+        """Screws against DH tables."""
+        table = self.robot(robot)
+        return self.once(("comparison", table.name), lambda: compare_models(table, rounds=7))

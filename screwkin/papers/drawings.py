@@ -1,0 +1,288 @@
+"""Figures of papers drawn again, by name: each takes the bench and named arguments, and gives a figure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import as_array, unstack
+from screwkin.analysis.compliance import Trial
+from screwkin.errors import InputError
+from screwkin.gait.balance import soles_on_floor
+from screwkin.kinematics.positions import frame_pose, link_displacements
+from screwkin.papers.bench import Bench
+from screwkin.papers.measures_leg import compensated_of, map_of, sinking_of, zmp_lines
+from screwkin.papers.measures_springs import trial_of
+from screwkin.report import balance, frames, maps, motion
+from screwkin.report.style import (
+    LINES,
+    MEASURED,
+    PLAIN,
+    SIDES,
+    ZMP,
+    Figure,
+    legend_above,
+    new_figure,
+    shade_swings,
+    shown,
+    time_axis,
+)
+from screwkin.sim.measure import ZmpRecord
+
+Drawing = Callable[..., Figure]
+
+
+def feet_along_x(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
+    """Feet against time along x."""
+    return motion.feet_along_x(bench.account(gait, steps, robot))
+
+
+def feet_along_z(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
+    """Height of the feet against time."""
+    return motion.feet_along_z(bench.account(gait, steps, robot))
+
+
+def waist_along_x(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
+    """Waist against time along x."""
+    return motion.waist_along_x(bench.account(gait, steps, robot))
+
+
+def waist_along_y(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
+    """Waist and feet against time along y."""
+    return motion.waist_along_y(bench.account(gait, steps, robot))
+
+
+def joint_angles(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
+    """Joint angles of the legs."""
+    figure = motion.joint_angles(bench.account(gait, steps, robot))
+    if figure is None:
+        raise InputError(f"{bench.robot(robot).name} has no legs, so there are no joint angles to draw")
+    return figure
+
+
+def walking(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
+    """Frames of the simulated walk."""
+    account = bench.account(gait, steps, robot)
+    return frames.frames_of_run(account, bench.validation(account).run)
+
+
+def planned(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
+    """Frames of the planned walk, from the side."""
+    return frames.frames_drawn(bench.account(gait, steps, robot))
+
+
+def zmp_along_x(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
+    """GCoM and ZMP against time along x."""
+    return balance.zmp_against_gcom(bench.account(gait, steps, robot), 0)
+
+
+def zmp_along_y(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
+    """GCoM and ZMP against time along y."""
+    return balance.zmp_against_gcom(bench.account(gait, steps, robot), 1)
+
+
+def seen_from_above(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
+    """Soles, support polygons, GCoM and ZMP from above."""
+    return balance.seen_from_above(bench.account(gait, steps, robot))
+
+
+def reach_maps(
+    bench: Bench, limb: str, heights: Sequence[float], resolution: float = 0.0025, robot: str = ""
+) -> Figure:
+    """What cuts the reach, and the inverse condition number, at several heights."""
+    places = [map_of(bench, limb, height, resolution, robot) for height in heights]
+    most = max(float(np.nanmax(place.inverse_condition, initial=0.0)) for place in places)
+    return maps.workspace_overview(bench.robot(robot), places, most)
+
+
+def deflection_maps(
+    bench: Bench, limb: str, heights: Sequence[float], stiffness: float = 1.0, robot: str = ""
+) -> Figure:
+    """Length of the deflection at several heights."""
+    found = [sinking_of(bench, limb, height, stiffness, "linear", 0.005, robot) for height in heights]
+    return maps.deflection_overview(bench.robot(robot), found)
+
+
+def deflection_parts(
+    bench: Bench, limb: str, height: float, stiffness: float = 1.0, robot: str = ""
+) -> Figure:
+    """Components of the deflection at a height."""
+    found = sinking_of(bench, limb, height, stiffness, "linear", 0.005, robot)
+    return maps.deflection_picture(bench.robot(robot), found)
+
+
+def preview(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
+    """Wanted ZMP, that of the cart and of all links, and the CoM, along x and y."""
+    account = bench.account(gait, steps, robot)
+    wanted, cart, whole = zmp_lines(bench, gait, steps, robot)
+    figure, axes = new_figure(5.2, 2, sharex=True)
+    for k, one in enumerate(axes):
+        shade_swings(one, account)
+        time = account.trajectory.time
+        one.plot(time, 1e3 * cart[:, k], color=MEASURED, linewidth=3.0, alpha=0.6, label="ZMP of the cart")
+        one.plot(time, 1e3 * wanted[:, k], color="#222222", linewidth=0.9, label="ZMP wanted")
+        one.plot(time, 1e3 * whole[:, k], color=ZMP, linewidth=1.0, linestyle="--", label="ZMP of all links")
+        one.plot(time, 1e3 * account.balance.com[:, k], color=SIDES[2], label="CoM")
+        one.set_ylabel(f"{'xy'[k]} [mm]")
+    time_axis(axes[1], account)
+    legend_above(figure, list(axes), columns=6)
+    return figure
+
+
+def compensated_joints(bench: Bench, gait: str, limb: str, stiffness: float, robot: str = "") -> Figure:
+    """Joint angles of a limb as intended, and what compensation adds to them."""
+    account = bench.account(gait, None, robot)
+    table, time = account.robot, account.trajectory.time
+    change = np.degrees(compensated_of(bench, gait, stiffness, "swing", robot).q - account.trajectory.q)
+    figure, (angle, added) = new_figure(5.2, 2, sharex=True)
+    for k, i in enumerate(table.path_to(table.limb(limb).link)):
+        style = {"color": SIDES[k % len(SIDES)], "linestyle": LINES[k % 2], "linewidth": 1.2}
+        name = shown(table.joint_names[i])
+        angle.plot(time, np.degrees(account.trajectory.q[:, i]), label=name, **style)
+        added.plot(time, change[:, i], label=name, **style)
+    for one in (angle, added):
+        shade_swings(one, account)
+    angle.set_ylabel("intended [deg]")
+    added.set_ylabel("added by compensation [deg]")
+    time_axis(added, account)
+    legend_above(figure, [angle], columns=4)
+    return figure
+
+
+def foot_from_waist(bench: Bench, gait: str, limb: str, stiffness: float, robot: str = "") -> Figure:
+    """The foot seen from the waist along x, y and z, as intended and as compensation commands it."""
+    account = bench.account(gait, None, robot)
+    intended, told = _seen_from_waist(bench, gait, limb, stiffness, robot)
+    figure, axes = new_figure(6.0, 3, sharex=True)
+    for k, one in enumerate(axes):
+        shade_swings(one, account)
+        one.plot(account.trajectory.time, 1e3 * intended[:, k], color=PLAIN, label="intended")
+        one.plot(account.trajectory.time, 1e3 * told[:, k], "--", color=SIDES[0], label="commanded")
+        one.set_ylabel(f"{'xyz'[k]} [mm]")
+    time_axis(axes[-1], account)
+    legend_above(figure, [axes[0]])
+    return figure
+
+
+def compensated_foot(bench: Bench, gait: str, limb: str, stiffness: float, robot: str = "") -> Figure:
+    """By how much compensation moves the commanded foot, seen from the waist."""
+    account = bench.account(gait, None, robot)
+    intended, told = _seen_from_waist(bench, gait, limb, stiffness, robot)
+    figure, axes = new_figure(3.0)
+    shade_swings(axes, account)
+    for k, colour in enumerate((SIDES[0], SIDES[1], PLAIN)):
+        moved = 1e3 * (told - intended)[:, k]
+        axes.plot(account.trajectory.time, moved, color=colour, label="xyz"[k], linestyle=LINES[k])
+    axes.set_ylabel(f"{shown(account.robot.limb(limb).tip)} moved by [mm]")
+    time_axis(axes, account)
+    legend_above(figure, [axes])
+    return figure
+
+
+def _seen_from_waist(bench: Bench, gait: str, limb: str, stiffness: float, robot: str) -> list[Array]:
+    """Places (T, 3) [m] of a limb's tip in the waist's frame, as intended and as commanded."""
+    account = bench.account(gait, None, robot)
+    told = compensated_of(bench, gait, stiffness, "swing", robot).q
+    tip = account.robot.limb(limb).tip
+    return [
+        as_array(frame_pose(account.robot, link_displacements(account.robot, unstack(q)), tip), (len(q),))[
+            :, :3, 3
+        ]
+        for q in (account.trajectory.q, told)
+    ]
+
+
+def sprung_zmp(
+    bench: Bench, gait: str, treatments: Sequence[str], stiffness: float, robot: str = ""
+) -> Figure:
+    """ZMP against time of a walk on elastic joints, simulated: wanted, and with every treatment."""
+    account = bench.account(gait, None, robot)
+    wanted = zmp_lines(bench, gait, None, robot)[0]
+    figure, axes = new_figure(5.6, 2, sharex=True)
+    for k, one in enumerate(axes):
+        shade_swings(one, account)
+        for treatment, style in zip(treatments, _TREATED, strict=False):
+            trial, zmp = _run_of(bench, gait, treatment, stiffness, robot)
+            one.plot(zmp.time, 1e3 * zmp.contact[:, k], label=_treated(trial), **style)
+        one.plot(
+            account.trajectory.time, 1e3 * wanted[:, k], color="#222222", linewidth=0.9, label="ZMP wanted"
+        )
+        one.set_ylabel(f"{'xy'[k]} [mm]")
+    time_axis(axes[1], account)
+    legend_above(figure, [axes[0]], columns=4)
+    return figure
+
+
+def sprung_zmp_above(
+    bench: Bench, gait: str, treatments: Sequence[str], stiffness: float, robot: str = ""
+) -> Figure:
+    """The same from above, one panel for each treatment, with the soles where the plan puts them."""
+    account = bench.account(gait, None, robot)
+    trajectory = account.trajectory
+    soles = soles_on_floor(account.robot, trajectory.feet, trajectory.T_world_tip)
+    wanted = zmp_lines(bench, gait, None, robot)[0]
+    figure, axes = new_figure(
+        0.8 + 1.55 * len(treatments), len(treatments), sharex=True, sharey=True, squeeze=False
+    )
+    for one, treatment, style in zip(axes[:, 0], treatments, _TREATED, strict=False):
+        balance.draw_soles(one, account, soles)
+        trial, zmp = _run_of(bench, gait, treatment, stiffness, robot)
+        one.plot(*zmp.contact.T, label=_treated(trial), **style)
+        one.plot(*wanted.T, color="#222222", linewidth=0.9, label="ZMP wanted")
+        one.set_aspect("equal")
+        one.set_ylabel("y [m]")
+    axes[-1, 0].set_xlabel("x [m]")
+    legend_above(figure, list(axes[:, 0]), columns=3)
+    return figure
+
+
+_TREATED = (
+    {"color": MEASURED, "linewidth": 1.0},
+    {"color": SIDES[3], "linewidth": 1.0},
+    {"color": SIDES[2], "linewidth": 1.0, "linestyle": "--"},
+)
+"""Lines of a figure's treatments, in their order."""
+
+
+def _run_of(bench: Bench, gait: str, treatment: str, stiffness: float, robot: str) -> tuple[Trial, ZmpRecord]:
+    trial = trial_of(bench, gait, treatment, stiffness, robot=robot)
+    if trial.zmp is None:
+        raise InputError(f"the run with treatment {treatment} tells no ZMP")
+    return trial, trial.zmp
+
+
+def _treated(trial: Trial) -> str:
+    told = {
+        "none": "without compensation",
+        "swing": "swing foot compensated",
+        "joint": "joints compensated",
+    }
+    fell = "" if trial.fell_at is None else f", falls at {trial.fell_at:.1f} s"
+    return told.get(trial.treatment, "joints led by the walk's torques") + fell
+
+
+_ALL: tuple[Drawing, ...] = (
+    feet_along_x,
+    feet_along_z,
+    waist_along_x,
+    waist_along_y,
+    joint_angles,
+    walking,
+    planned,
+    zmp_along_x,
+    zmp_along_y,
+    seen_from_above,
+    reach_maps,
+    deflection_maps,
+    deflection_parts,
+    preview,
+    compensated_joints,
+    foot_from_waist,
+    compensated_foot,
+    sprung_zmp,
+    sprung_zmp_above,
+)
+
+DRAWINGS: Mapping[str, Drawing] = {drawing.__name__: drawing for drawing in _ALL}

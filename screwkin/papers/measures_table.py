@@ -1,0 +1,164 @@
+"""Measures of a robot's table and of its closed mechanism."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import UNTURNED, Pose, Vector, as_array, vector_from_array
+from screwkin.analysis.chains import by_screws, chains_of
+from screwkin.analysis.compare import random_positions
+from screwkin.errors import InputError, UnknownNameError
+from screwkin.kinematics.positions import screws_in
+from screwkin.model.dh import DHRow
+from screwkin.model.robot import Robot
+from screwkin.papers.bench import Bench
+
+MECHANISM = (
+    "actuated_joints",
+    "couplings",
+    "links",
+    "circuits",
+    "mobility",
+    "kutzbach",
+    "network_shape",
+    "rank",
+    "condition",
+    "primary",
+    "secondary",
+)
+
+
+def mass(bench: Bench, link: str = "", robot: str = "") -> float:
+    """Mass [kg] of a link, or of the whole robot."""
+    table = bench.robot(robot)
+    return float(table.link(link).mass if link else table.mass)
+
+
+def center_of_mass(bench: Bench, link: str, robot: str = "") -> Array:
+    """CoM (3,) [m] of a link in the zero pose."""
+    return _vector(bench.robot(robot).link(link).com)
+
+
+def middle_of_link(bench: Bench, link: str, between: Sequence[str], robot: str = "") -> float:
+    """Distance [m] of a link's CoM from the middle between two places."""
+    return float(np.linalg.norm(center_of_mass(bench, link, robot) - _middle(bench.robot(robot), between)))
+
+
+def place(bench: Bench, at: Sequence[str], seen_from: Sequence[str] = (), robot: str = "") -> Array:
+    """Place (3,) [m] of a joint's axis point or a tip in the zero pose, or the middle between several.
+
+    Seen from the base origin, or from the middle between other places.
+    """
+    table = bench.robot(robot)
+    return _middle(table, at) - (_middle(table, seen_from) if seen_from else 0.0)
+
+
+def distance(bench: Bench, between: Sequence[str], along: str = "", robot: str = "") -> float:
+    """Distance [m] of two places in the zero pose, or of their coordinates along x, y or z."""
+    first, second = (_place(bench.robot(robot), name) for name in between)
+    gap = second - first
+    return float(abs(gap["xyz".index(along)]) if along else np.linalg.norm(gap))
+
+
+def axis(bench: Bench, joint: str, robot: str = "") -> Array:
+    """Direction s (3,) of a joint's axis in the zero pose."""
+    return _vector(bench.robot(robot).joint(joint).screw.s)
+
+
+def limits(bench: Bench, joint: str, robot: str = "") -> Array:
+    """Lower and upper limit (2,) of a joint [rad or m]."""
+    found = bench.robot(robot).joint(joint)
+    return np.array([found.lower, found.upper])
+
+
+def sole(bench: Bench, limb: str, robot: str = "") -> Array:
+    """Length and width (2,) of a sole [m]."""
+    for one in bench.robot(robot).soles:
+        if one.limb == limb:
+            return np.asarray(np.ptp([_vector(corner)[:2] for corner in one.corners], axis=0))
+    raise UnknownNameError("sole", limb, [one.limb for one in bench.robot(robot).soles])
+
+
+def size(bench: Bench, along: str = "xyz", link: str = "", robot: str = "") -> Array:
+    """Length, width and height (3,) [m] of the boxes of a link or of all, or those named by letters."""
+    table = bench.robot(robot)
+    boxes = [box for one in ([table.link(link)] if link else table.links) for box in one.boxes]
+    ends = [_vector(box.center) + sign * _vector(box.size) / 2 for box in boxes for sign in (-1, 1)]
+    return np.asarray(np.ptp(ends, axis=0)[["xyz".index(letter) for letter in along]])
+
+
+def reference_error(bench: Bench, limb: str, reference: Sequence[str], robot: str = "") -> float:
+    """Largest difference of a tip's pose when its screws are told in another frame [1 and m].
+
+    The frame stands in the middle between two places, with the axes of the base; the pose is
+    A_base,reference times the successive displacements there times A_reference,tip.
+    """
+    table = bench.robot(robot)
+    chain = next((one for one in chains_of(table) if one.name == limb), None)
+    if chain is None:
+        raise UnknownNameError("limb", limb, [one.name for one in table.limbs])
+    there = Pose(UNTURNED, vector_from_array(_middle(table, reference)))
+    told = screws_in(there, chain.screws)
+    q = random_positions(table, 1000, np.random.default_rng(0))
+    values = [q[:, i] for i in chain.joints]
+    tip, _ = by_screws(chain.screws, chain.frame, values)
+    other, _ = by_screws(told, there.inverse @ chain.frame, values)
+    return float(np.abs(as_array(tip) - as_array(there @ other)).max())
+
+
+def mechanism(bench: Bench, key: str, robot: str = "") -> float | Sequence[float]:
+    """A count of the closed mechanism, or how many names a list of it holds."""
+    if key not in MECHANISM:
+        raise UnknownNameError("fact of a mechanism", key, MECHANISM)
+    value = bench.facts(robot).to_dict()[key]
+    listed = key in ("primary", "secondary")
+    counted: float | Sequence[float] = len(value) if listed else value
+    return counted
+
+
+def comparison(bench: Bench, key: str, part: str = "", robot: str = "") -> float:
+    """A number of the comparison of screws with DH tables."""
+    found = bench.comparison(robot).to_dict()
+    value = found.get(key)
+    if part and isinstance(value, dict):
+        for name in part.split("."):
+            value = value[name]
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise InputError(f"comparison has no number {key} {part}".rstrip())
+    return value
+
+
+def dh_angles(bench: Bench, joint: str, robot: str = "") -> Array:
+    """Angles alpha and offset (2,) [rad] of a joint in the DH table beside the robot's file."""
+    row = _dh_row(bench.robot(robot), joint)
+    return np.array([row.alpha, row.offset])
+
+
+def dh_lengths(bench: Bench, joint: str, robot: str = "") -> Array:
+    """Lengths a and d (2,) [m] of a joint in the DH table beside the robot's file."""
+    row = _dh_row(bench.robot(robot), joint)
+    return np.array([row.a, row.d])
+
+
+def _dh_row(robot: Robot, joint: str) -> DHRow:
+    rows = {row.joint: row for chain in chains_of(robot) for row in chain.table.rows}
+    if joint not in rows:
+        raise UnknownNameError("joint of a DH table", joint, list(rows))
+    return rows[joint]
+
+
+def _vector(v: Vector) -> Array:
+    return np.array([float(c) for c in v])
+
+
+def _place(robot: Robot, name: str) -> Array:
+    if name in robot.joint_names:
+        return _vector(robot.joint(name).screw.s0)
+    return _vector(robot.frame(name)[1].p)
+
+
+def _middle(robot: Robot, names: Sequence[str]) -> Array:
+    return np.asarray(np.mean([_place(robot, name) for name in names], axis=0))

@@ -1,0 +1,170 @@
+"""A paper measured anew: its printed values beside ours, with the reasons where they differ."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from screwkin.errors import MissingDependencyError
+from screwkin.papers.bench import Bench
+from screwkin.papers.claims import UNITS, Paper, Row, Section, Value
+from screwkin.papers.measures import MEASURES, check_call
+
+MARKS = {True: "same", False: "differs", None: ""}
+"""How a row's agreement is told."""
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class Line:
+    """One row of a reproduction.
+
+    Attributes:
+        item: table, figure or claim of the paper, with the unit.
+        paper: what is printed; None where the paper gives no value.
+        ours: what was measured; None if a package for it is absent.
+        note: where and why they differ, or how ours is meant.
+        agrees: whether they are equal, within what the row allows; None if they cannot be compared.
+        form: how ours is written.
+    """
+
+    item: str
+    paper: Value
+    ours: Value
+    note: str
+    agrees: bool | None
+    form: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The row as JSON data."""
+        return {
+            "item": self.item,
+            "paper": self.paper,
+            "ours": self.ours,
+            "note": self.note,
+            "agrees": self.agrees,
+        }
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A section of a paper with its rows measured."""
+
+    section: Section
+    lines: tuple[Line, ...]
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """A paper with all its rows measured."""
+
+    paper: Paper
+    sections: tuple[Measured, ...]
+
+    @property
+    def lines(self) -> tuple[Line, ...]:
+        """All rows."""
+        return tuple(line for measured in self.sections for line in measured.lines)
+
+    def count(self, agrees: bool | None) -> int:
+        """How many rows agree (True), differ (False) or cannot be compared (None)."""
+        return sum(line.agrees is agrees for line in self.lines)
+
+    @property
+    def summary(self) -> str:
+        """How many values agree, in a sentence."""
+        return (
+            f"{len(self.lines)} rows: {self.count(True)} as printed, {self.count(False)} different, each "
+            f"with its reason, and {self.count(None)} measured where the paper prints no number."
+        )
+
+
+def check_paper(paper: Paper) -> None:
+    """Raise unless every row names a known measure and its arguments.
+
+    Raises:
+        UnknownNameError, InputError: the first row that does not.
+    """
+    for section in paper.sections:
+        for row in section.rows:
+            check_call("measure", row.measure, MEASURES, row.with_, _item(section, row))
+
+
+def reproduce(paper: Paper, bench: Bench, progress: Progress = lambda share: None) -> Reproduction:
+    """Measure every row of a paper.
+
+    Args:
+        paper: from ``load_paper``.
+        bench: where robots, walks and studies are made and kept.
+        progress: told the share of rows done.
+
+    Raises:
+        UnknownNameError, InputError: a row names no measure, or wrong arguments.
+    """
+    check_paper(paper)
+    total, done, sections = max(1, sum(len(s.rows) for s in paper.sections)), 0, []
+    for section in paper.sections:
+        lines = []
+        for row in section.rows:
+            lines.append(_measured(section, row, bench))
+            done += 1
+            progress(done / total)
+        sections.append(Measured(section, tuple(lines)))
+    return Reproduction(paper, tuple(sections))
+
+
+def _item(section: Section, row: Row) -> str:
+    unit = f" [{row.unit}]" if row.unit else ""
+    return f"{section.place}: {row.item}{unit}"
+
+
+def _measured(section: Section, row: Row, bench: Bench) -> Line:
+    item, form = _item(section, row), row.form
+    try:
+        value = MEASURES[row.measure](bench, **row.with_)
+    except MissingDependencyError as error:
+        return Line(item, row.paper, None, f"not measured: {error}", None, form)
+    ours = _scaled(value, UNITS.get(row.unit, 1.0))
+    return Line(item, row.paper, ours, row.note, agreement(row.paper, ours, row.within), form)
+
+
+def _scaled(value: Value, factor: float) -> Value:
+    """The value in a row's unit, as plain numbers."""
+    if value is None or isinstance(value, str):
+        return value
+    if isinstance(value, int) and factor == 1.0:
+        return value
+    scaled = np.asarray(value) * (factor if factor != 1.0 else 1)
+    plain: Value = scaled.tolist()
+    return plain
+
+
+def agreement(paper: Value, ours: Value, within: float) -> bool | None:
+    """Whether two values are equal up to ``within``, relative to the paper's and absolute below 1."""
+    if paper is None or ours is None:
+        return None
+    if isinstance(paper, str) or isinstance(ours, str):
+        return paper == ours if isinstance(paper, str) and isinstance(ours, str) else None
+    a, b = np.atleast_1d(np.asarray(paper, dtype=float)), np.atleast_1d(np.asarray(ours, dtype=float))
+    if a.shape != b.shape:
+        return False
+    return bool((np.abs(a - b) <= within * np.maximum(1.0, np.abs(a))).all())
+
+
+def written(value: Value, form: str = "") -> str:
+    """A value for a page; zero is 0 in any form."""
+    if value is None or isinstance(value, str):
+        return value or ""
+    if isinstance(value, Sequence):
+        parts = [written(one, form) for one in value]
+        return parts[0] if len(parts) == 1 else f"({', '.join(parts)})"
+    if value == 0 or (isinstance(value, int) and not form):
+        return str(int(value))
+    text = format(value, form or ".8g")
+    if not float(text):
+        text = text.lstrip("-")
+    return text.replace("-", "−", 1) if text.startswith("-") else text

@@ -1,1 +1,0 @@
-"""Rates, positions and statuses: the algorithms that meet the formulas at arrays."""
