@@ -9,8 +9,8 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.compiler.run import run
-from screwkin.dynamics.body import balance
 from screwkin.dynamics.margin import support_margin_fast
+from screwkin.dynamics.quantities import balance
 from screwkin.dynamics.support import Spike, sole_corners, spikes
 from screwkin.errors import InputError
 from screwkin.model.robot import Robot

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
-from screwkin.algebra.scalar import Scalar
+from screwkin.algebra.scalar import Scalar, is_symbolic
 from screwkin.algebra.screws import Screw
-from screwkin.algebra.se3 import UNTURNED, Pose, Vector
+from screwkin.algebra.se3 import UNTURNED, Pose, Vector, leaves
 from screwkin.errors import UnknownNameError
 
 JointType = Literal["revolute", "prismatic", "helical"]
@@ -154,6 +154,14 @@ class Robot:
     def mass(self) -> Scalar:
         """Total mass [kg]."""
         return sum(link.mass for link in self.links)
+
+    @cached_property
+    def is_symbolic(self) -> bool:
+        """True if any number is a symbol, as in the symbolic twin of a table."""
+        records: list[Any] = [x for link in self.links for x in (link.com, link.inertia, link.frame)]
+        records += [x for joint in self.joints for x in (joint.screw.s, joint.screw.s0, joint.screw.pitch)]
+        records += [limb.frame for limb in self.limbs] + [link.mass for link in self.links]
+        return any(is_symbolic(leaf) for record in records for leaf in leaves(record))
 
     @cached_property
     def joint_above(self) -> Mapping[str, int]:
