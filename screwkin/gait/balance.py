@@ -10,7 +10,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.compiler.run import run
 from screwkin.dynamics.body import balance
-from screwkin.dynamics.margin import support_margin_fast
+from screwkin.dynamics.margin import support_margin
 from screwkin.dynamics.support import Spike, sole_corners, spikes
 from screwkin.errors import InputError
 from screwkin.model.robot import Robot
@@ -85,7 +85,7 @@ def ground_margin(zmp: Array, com: Array, wrench: Array, soles: Array, contact: 
         soles: (T, feet, corners, 2) [m].
         contact: (T, feet).
     """
-    margin = support_margin_fast(zmp, soles, contact)
+    margin = support_margin(zmp, soles, contact)
     return np.where(wrench[:, 5] > 0, margin, np.minimum(margin, 0.0) - np.abs(com[:, 2]))
 
 
