@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import screwkin as sk
+from screwkin.compliance.equilibrium import Loaded
+from screwkin.compliance.stiffness import static_deflection
 from screwkin.dynamics.margin import support_margin
+from screwkin.dynamics.newton_euler import GRAVITY
+from tests.kinematics.machines import random_state, random_tree
 
 BATCHES = (7, 999, 5000)
 seeds = st.integers(0, 2**32 - 1)
@@ -29,3 +37,47 @@ def test_a_margin_does_not_depend_on_its_neighbours(seed, feet, corners, grid):
     for k in range(20):
         alone = support_margin(zmp[k : k + 1], soles[k : k + 1], contact[k : k + 1])
         np.testing.assert_array_equal(alone, together[k : k + 1])
+
+
+def conditions(robot, state, support, k, theta):
+    """Condition (B,) of the matrix of springs and weight at deflections theta (B, n)."""
+    everyone, T = np.arange(len(theta)), np.broadcast_to(state.T_world_base, (len(theta), 4, 4))
+    loaded = Loaded(robot, support, T, state.q, np.full(theta.shape[1], k), GRAVITY)
+    _, slope = loaded.balance(everyone)(theta, everyone)
+    return np.linalg.cond(slope)
+
+
+def batch_matters_not(robot, state, support, k, method):
+    """Parts of a batch, and samples alone, have its status, and its numbers to 1e-12 times the condition."""
+    whole = static_deflection(robot, state, support, k, method)
+    condition = conditions(robot, state, support, k, whole.theta)
+    hard = np.flatnonzero(~(whole.converged & whole.stable))[:3]
+    for rows in (*map(slice, BATCHES), *np.arange(5)[:, None], *hard[:, None]):
+        some = static_deflection(robot, sk.State(state.T_world_base, state.q[rows]), support, k, method)
+        for name in ("converged", "stable", "iterations"):
+            np.testing.assert_array_equal(getattr(some, name), getattr(whole, name)[rows], err_msg=name)
+        for name in ("theta", "change"):
+            apart = np.abs(getattr(some, name) - getattr(whole, name)[rows])[some.converged]
+            allowed = 1e-12 * condition[rows][some.converged]
+            assert (apart.reshape(len(allowed), np.prod(apart.shape[1:])) <= allowed[:, None]).all()
+    return whole
+
+
+@pytest.mark.parametrize("method", ["linear", "nonlinear"])
+@pytest.mark.parametrize("name", ["bioloid", "poppy12"])
+def test_a_deflection_does_not_depend_on_its_neighbours(name, method):
+    robot = sk.load_robot(name)
+    home = sk.home(robot)
+    q = home.q + np.random.default_rng(0).uniform(-0.5, 0.5, (5000, len(home.q)))
+    whole = batch_matters_not(robot, sk.State(home.T_world_base, q), "left_foot", 60.0, method)
+    assert (whole.converged & whole.stable).all()
+
+
+@given(seed=st.integers(0, 50), k=st.sampled_from([40.0, 200.0, 600.0]), data=st.data())
+@settings(max_examples=8, deadline=None, derandomize=True)
+def test_nor_do_deflections_of_random_trees(seed, k, data):
+    tree = replace(random_tree(seed), closures=())
+    q = np.random.default_rng(seed).uniform(-1, 1, (999, len(tree.joints)))
+    state = sk.State(random_state(tree, seed).T_world_base, q)
+    support = data.draw(st.sampled_from(tree.link_names))
+    batch_matters_not(tree, state, support, k, data.draw(st.sampled_from(["linear", "nonlinear"])))
