@@ -209,7 +209,7 @@ def test_trajectories_that_do_not_fit_are_refused(robot: sk.Robot, walked: sk.Tr
         compensate(sk.load_robot("bioloid"), walked, K)
     flying = walked.contact.copy()
     flying[60] = False
-    with pytest.raises(InputError, match=r"t = 1\.200 s: no foot bears"):
+    with pytest.raises(InputError, match=r"t = 1\.200 s: no foot is in contact"):
         compensate(robot, replace(walked, contact=flying), K)
     with pytest.raises(UnknownNameError, match="elbow"):
         compensate(robot, walked, {"elbow": 3.0, "default": K})
