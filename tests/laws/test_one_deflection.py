@@ -10,10 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import screwkin as sk
+from screwkin.analysis.workspace import workspace
 from screwkin.compliance.equilibrium import Loaded
 from screwkin.compliance.stiffness import static_deflection
 from screwkin.dynamics.margin import support_margin
 from screwkin.dynamics.newton_euler import GRAVITY
+from screwkin.ik.reach import reach
 from tests.kinematics.machines import random_state, random_tree
 
 BATCHES = (7, 999, 5000)
@@ -81,3 +83,29 @@ def test_nor_do_deflections_of_random_trees(seed, k, data):
     state = sk.State(random_state(tree, seed).T_world_base, q)
     support = data.draw(st.sampled_from(tree.link_names))
     batch_matters_not(tree, state, support, k, data.draw(st.sampled_from(["linear", "nonlinear"])))
+
+
+@pytest.mark.parametrize(("name", "height"), [("bioloid", 0.16), ("poppy12", 0.375)])
+def test_a_point_of_a_workspace_does_not_depend_on_its_neighbours(name, height):
+    """A grid and one twice as coarse; points alone and in batches, mirror planes and borders among them."""
+    robot = sk.load_robot(name)
+    fine, coarse = (workspace(robot, "left_leg", [height], step)[0] for step in (0.004, 0.008))
+    x, i, k = np.intersect1d(fine.x, coarse.x, return_indices=True)
+    y, j, m = np.intersect1d(fine.y, coarse.y, return_indices=True)
+    assert len(x) >= len(coarse.x) - 2
+    ours, theirs = np.ix_(i, j), np.ix_(k, m)
+    np.testing.assert_array_equal(fine.cause[ours], coarse.cause[theirs])
+    np.testing.assert_allclose(fine.q[ours], coarse.q[theirs], rtol=0, atol=1e-9)
+    np.testing.assert_allclose(fine.inverse_condition[ours], coarse.inverse_condition[theirs], atol=1e-12)
+    rows = [robot.joint_names.index(joint) for joint in fine.joint_names]
+    guess = np.array(robot.posture("home").q)[rows]
+    points = np.array([(a, b, -height) for a in x for b in y])
+    whole = reach(robot, "left_leg", points, guess, fine.length)
+    np.testing.assert_array_equal(whole.cause.reshape(len(x), len(y)), fine.cause[ours])
+    for part in (slice(7), slice(99), *np.arange(0, len(points), len(points) // 40)[:, None]):
+        some = reach(robot, "left_leg", points[part], guess, fine.length)
+        np.testing.assert_array_equal(some.cause, whole.cause[part])
+        allowed = 1e-12 / np.nan_to_num(whole.inverse_condition[part], nan=1.0)
+        apart = np.nan_to_num(np.abs(some.q - whole.q[part])).max(axis=1)
+        assert (apart <= allowed).all()
+        np.testing.assert_allclose(some.inverse_condition, whole.inverse_condition[part], rtol=0, atol=1e-12)
