@@ -106,7 +106,7 @@ def first_order(loaded: Loaded) -> Deflected:
 
 
 def equilibrium(loaded: Loaded) -> Deflected:
-    """Deflections where springs and weight are in balance; the last ones tried where none are found."""
+    """Deflections where springs and weight are in balance; the last ones tried where there are none."""
     theta, residual, iterations, certified = _steps(loaded)
     stable = certified.copy()
     for rows in _blocks(~certified):

@@ -24,7 +24,7 @@ def sole_corners(robot: Robot, foot: str) -> Array:
     """Corners (k, 3) of a foot's sole in the frame of its tip [m].
 
     Raises:
-        InputError: the table gives no sole for that limb.
+        InputError: that limb has no sole. UnknownNameError: no such limb.
     """
     limb = robot.limb(foot)
     for sole in robot.soles:

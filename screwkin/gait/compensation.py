@@ -32,7 +32,7 @@ from screwkin.compliance.stiffness import Deflection, static_deflection
 from screwkin.compliance.stiffness import Method as StaticModel
 from screwkin.errors import InputError, LimitError, NoSolutionError
 from screwkin.gait.feed_forward import walking_torques
-from screwkin.gait.loads import load_shares
+from screwkin.gait.loads import load_distribution
 from screwkin.ik.whole_body import solve_samples
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.model.robot import Robot
@@ -151,7 +151,7 @@ def _commands(
     strange = [foot for foot in trajectory.feet if foot not in robot.tip_names]
     if strange:
         raise InputError(f"the trajectory's feet {', '.join(strange)} are no tips of {robot.name}")
-    shares = load_shares(trajectory)
+    shares = load_distribution(trajectory)
     change = np.zeros_like(trajectory.q)
     yield change
     shifts = np.zeros((trajectory.samples, len(trajectory.feet), 3))

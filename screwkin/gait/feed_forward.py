@@ -20,7 +20,7 @@ from screwkin.algebra.se3 import (
     vector_from_array,
 )
 from screwkin.dynamics.newton_euler import GRAVITY, Bodies, inverse_dynamics
-from screwkin.gait.loads import load_shares
+from screwkin.gait.loads import load_distribution
 from screwkin.model.robot import Robot
 from screwkin.trajectory import Trajectory
 
@@ -38,7 +38,7 @@ def walking_torques(robot: Robot, trajectory: Trajectory) -> Array:
     Raises:
         InputError: other than two feet, or a sample in which none is in contact.
     """
-    shares, batch = load_shares(trajectory), (trajectory.samples,)
+    shares, batch = load_distribution(trajectory), (trajectory.samples,)
     bodies = Bodies.of(robot, pose_from_array(trajectory.T_world_base).R, unstack(trajectory.q))
     ground, free = inverse_dynamics(
         bodies,

@@ -13,7 +13,7 @@ LEAST_WAY = 0.1
 """Least way of the ZMP from foot to foot, as a share of their distance, that says how the load moves."""
 
 
-def load_shares(trajectory: Trajectory) -> Array:
+def load_distribution(trajectory: Trajectory) -> Array:
     """Share of the weight on either foot, (T, 2), continuous in time; rows add up to 1.
 
     In single support the foot in contact has all. In double support the share follows the planned ZMP's way

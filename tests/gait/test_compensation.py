@@ -14,7 +14,7 @@ import screwkin as sk
 from screwkin.compliance.stiffness import static_deflection
 from screwkin.errors import InputError, LimitError, NoSolutionError, UnknownNameError
 from screwkin.gait.compensation import compensate, convergence
-from screwkin.gait.loads import load_shares
+from screwkin.gait.loads import load_distribution
 from screwkin.trajectory import load_trajectory
 
 K = 60.0
@@ -149,7 +149,7 @@ def test_a_hundred_times_stiffer_needs_a_hundredth(robot: sk.Robot, walked: sk.T
 
 
 def test_the_load_goes_from_foot_to_foot_without_a_jump(walked: sk.Trajectory) -> None:
-    shares = load_shares(walked)
+    shares = load_distribution(walked)
     np.testing.assert_allclose(shares.sum(axis=1), 1.0)
     for foot, _, rows in stances(walked):
         assert (shares[rows, walked.feet.index(foot)] == 1.0).all()
