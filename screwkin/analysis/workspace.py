@@ -19,11 +19,12 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, cross, dot, norm
 from screwkin.compiler.run import run
 from screwkin.errors import InputError
+from screwkin.ik.closed import recognised
+from screwkin.ik.limb import solve_limb
 from screwkin.ik.limb_map import limb_map
-from screwkin.ik.numeric import IkSettings, solve_limb
-from screwkin.ik.programs import solvable
+from screwkin.ik.numeric import IkSettings
 from screwkin.ik.solutions import LimbSolutions
-from screwkin.kinematics.serial_chain import Chain, missing
+from screwkin.kinematics.serial_chain import SerialChain, residual
 from screwkin.model.robot import Robot
 
 Progress = Callable[[float], None]
@@ -114,7 +115,7 @@ def workspace(
     Raises:
         InputError: the limb has too few joints, or heights or resolution make no grid.
     """
-    chain = Chain.of(robot, limb)
+    chain = SerialChain.of(robot, limb)
     if len(chain.joints) < 6:
         raise InputError(
             f"{chain.limb} has {len(chain.joints)} joints; six are needed to hold its tip's orientation"
@@ -139,7 +140,7 @@ def default_heights(robot: Robot, limb: str) -> list[float]:
     Raises:
         InputError: the limb does not hang down in the zero pose.
     """
-    chain = Chain.of(robot, limb)
+    chain = SerialChain.of(robot, limb)
     top = float(chain.screws[0].s0.z)
     drop = top - float(chain.tip.p.z)
     if drop < 0.02:
@@ -147,7 +148,7 @@ def default_heights(robot: Robot, limb: str) -> list[float]:
     return [round(round((fraction * drop - top) / 0.005) * 0.005, 9) for fraction in LEVELS]
 
 
-def normalising_length(chain: Chain) -> float:
+def normalising_length(chain: SerialChain) -> float:
     """Length [m] that makes velocities comparable with angular ones: thigh and shin.
 
     The sum of the distances between neighbouring parallel axes; the limb's size if there are none.
@@ -160,7 +161,9 @@ def normalising_length(chain: Chain) -> float:
     return total if total > 1e-3 else chain.length
 
 
-def _level(robot: Robot, chain: Chain, height: float, resolution: float, progress: Progress) -> WorkspaceMap:
+def _level(
+    robot: Robot, chain: SerialChain, height: float, resolution: float, progress: Progress
+) -> WorkspaceMap:
     """The map of one height."""
     x, y, near = _grid(chain, height, resolution)
     n, count = len(chain.joints), near.size
@@ -168,7 +171,7 @@ def _level(robot: Robot, chain: Chain, height: float, resolution: float, progres
     inverse, q = np.full(count, np.nan), np.full((count, n), np.nan)
     length, guess = normalising_length(chain), _guess(robot, chain)
     tried = np.flatnonzero(near)
-    compiled = solvable(robot, chain.limb, True)
+    compiled = recognised(chain) is not None
     block = LARGE_BLOCK if compiled else BLOCK
     for begin in range(0, len(tried), block):
         here = tried[begin : begin + block]
@@ -197,7 +200,7 @@ def _level(robot: Robot, chain: Chain, height: float, resolution: float, progres
     )
 
 
-def _found(chain: Chain, points: Array, guess: Array, length: float) -> tuple[Array, Array, Array]:
+def _found(chain: SerialChain, points: Array, guess: Array, length: float) -> tuple[Array, Array, Array]:
     """Cause (B,), q (B, n) and inverse condition (B,) where the tip is at points (B, 3) of the base frame."""
     count = len(points)
     target = np.tile(as_array(chain.tip).astype(float), (count, 1, 1))
@@ -212,7 +215,7 @@ def _found(chain: Chain, points: Array, guess: Array, length: float) -> tuple[Ar
 
 
 def _compiled(
-    robot: Robot, chain: Chain, points: Array, guess: Array, length: float
+    robot: Robot, chain: SerialChain, points: Array, guess: Array, length: float
 ) -> tuple[Array, Array, Array]:
     """As ``_found`` by the limb's kernel; what that leaves open is found by the solvers."""
     told = run(limb_map(robot, chain.limb, tuple(guess.tolist()), length), {"point": points})
@@ -233,12 +236,12 @@ def _blocks(samples: Array) -> list[Array]:
     return [samples[i : i + BLOCK] for i in range(0, len(samples), BLOCK)]
 
 
-def _cause_names(chain: Chain) -> tuple[str, ...]:
+def _cause_names(chain: SerialChain) -> tuple[str, ...]:
     sides = [f"{name} {side}" for name in chain.names for side in ("lower", "upper")]
     return ("reachable", "out of reach", *sides)
 
 
-def _guess(robot: Robot, chain: Chain) -> Array:
+def _guess(robot: Robot, chain: SerialChain) -> Array:
     """The home posture if the table has one, else the middle of the limits."""
     for posture in robot.postures:
         if posture.name == "home":
@@ -247,7 +250,7 @@ def _guess(robot: Robot, chain: Chain) -> Array:
     return np.where(bounded, (np.where(bounded, chain.lower, 0) + np.where(bounded, chain.upper, 0)) / 2, 0.0)
 
 
-def _grid(chain: Chain, height: float, resolution: float) -> tuple[Array, Array, Array]:
+def _grid(chain: SerialChain, height: float, resolution: float) -> tuple[Array, Array, Array]:
     """Multiples of the resolution x (X,), y (Y,), and which points (X, Y) the limb's size may allow.
 
     With the tip's orientation held, a point of the last axis moves as the tip does; from the first axis it
@@ -278,7 +281,7 @@ def _grid(chain: Chain, height: float, resolution: float) -> tuple[Array, Array,
     return x, y, near
 
 
-def _causes(chain: Chain, found: LimbSolutions) -> Array:
+def _causes(chain: SerialChain, found: LimbSolutions) -> Array:
     """(B,) index of what decides: of all branches the one least beyond the limits, and its worst joint."""
     below, above = chain.lower - found.q, found.q - chain.upper
     beyond = np.where(found.valid[..., None], np.maximum(below, above), np.inf)
@@ -291,9 +294,9 @@ def _causes(chain: Chain, found: LimbSolutions) -> Array:
     return np.where(found.in_limits.any(axis=-1), REACHABLE, reached).astype(np.int16)
 
 
-def _inverse_condition(chain: Chain, q: Array, target: Array, length: float) -> Array:
+def _inverse_condition(chain: SerialChain, q: Array, target: Array, length: float) -> Array:
     """Smallest over largest singular value (B,) of the Jacobian at the tip, velocities over a length."""
-    _, J = missing(chain, q, target)
+    _, J = residual(chain, q, target)
     J[:, 3:] /= length
     values = np.linalg.svd(J, compute_uv=False)
     return values[:, -1] / values[:, 0]

@@ -11,7 +11,7 @@ import screwkin as sk
 from screwkin.analysis import workspace as maps
 from screwkin.compiler.run import run
 from screwkin.ik.limb_map import limb_map
-from screwkin.kinematics.serial_chain import Chain
+from screwkin.kinematics.serial_chain import SerialChain
 from tests.compiler.robots import with_leg
 from tests.ik.legs import backwards, random_parallel_leg, random_spherical_leg
 
@@ -25,7 +25,7 @@ def points_of(chain, height, resolution):
 
 def agree(robot, limb, points, surely=0.99):
     """Causes, positions and conditioning of both paths; the share of samples that the kernel is sure of."""
-    chain = Chain.of(robot, limb)
+    chain = SerialChain.of(robot, limb)
     length, guess = maps.normalising_length(chain), maps._guess(robot, chain)
     cause, q, inverse = maps._found(chain, points, guess, length)
     told = maps._compiled(robot, chain, points, guess, length)
@@ -44,7 +44,7 @@ def agree(robot, limb, points, surely=0.99):
 @pytest.mark.parametrize(("name", "limb"), [("bioloid", "left_leg"), ("poppy12", "right_leg")])
 def test_maps_of_bundled_legs_are_those_of_the_readable_path(name, limb):
     robot = sk.load_robot(name)
-    chain = Chain.of(robot, limb)
+    chain = SerialChain.of(robot, limb)
     heights = maps.default_heights(robot, limb)
     points = np.concatenate([points_of(chain, h, 0.008 if name == "bioloid" else 0.02) for h in heights])
     causes = agree(robot, limb, points)
@@ -58,7 +58,7 @@ def test_maps_of_bundled_legs_are_those_of_the_readable_path(name, limb):
 )
 def test_maps_of_legs_with_any_axes(leg):
     robot = with_leg(leg, 5)
-    chain = Chain.of(robot, "left_leg")
+    chain = SerialChain.of(robot, "left_leg")
     rng = np.random.default_rng(0)
     points = float(chain.tip.p.x), float(chain.tip.p.y), float(chain.tip.p.z)
     causes = agree(robot, "left_leg", points + rng.normal(size=(1500, 3)), 0.95)
@@ -74,7 +74,7 @@ def test_mirror_images_straight_legs_and_borders_are_decided_as_the_readable_pat
         postures=(),
         joints=tuple(replace(joint, lower=-np.inf, upper=np.inf) for joint in robot.joints),
     )
-    chain = Chain.of(free, "left_leg")
+    chain = SerialChain.of(free, "left_leg")
     hip, tip = (np.array([float(c) for c in p]) for p in (chain.screws[0].s0, chain.tip.p))
     share, ankle = np.linspace(0.0, 1.0, 30)[:, None], np.array([0.0, 0.0, 0.030779])
     up, forward = share * np.array([0.0, 0.0, 0.05]), share * np.array([0.05, 0.0, 0.0])
