@@ -18,8 +18,9 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import cross, dot, norm
 from screwkin.errors import InputError
+from screwkin.ik.limb import resting
 from screwkin.ik.reach import OUT_OF_REACH, REACHABLE, cause_names, reach
-from screwkin.kinematics.serial_chain import Chain
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.model.robot import Robot
 
 Progress = Callable[[float], None]
@@ -107,7 +108,7 @@ def workspace(
         InputError: the limb has too few joints, heights or resolution make no grid, or there are closures.
         UnknownNameError: no such limb.
     """
-    chain = Chain.of(robot, limb)
+    chain = SerialChain.of(robot, limb)
     if robot.closures:
         names = ", ".join(closure.name for closure in robot.closures)
         raise InputError(
@@ -138,7 +139,7 @@ def default_heights(robot: Robot, limb: str) -> list[float]:
     Raises:
         InputError: the limb does not hang down in the zero pose.
     """
-    chain = Chain.of(robot, limb)
+    chain = SerialChain.of(robot, limb)
     top = float(chain.screws[0].s0.z)
     drop = top - float(chain.tip.p.z)
     if drop < 0.02:
@@ -146,7 +147,7 @@ def default_heights(robot: Robot, limb: str) -> list[float]:
     return [round(round((fraction * drop - top) / 0.005) * 0.005, 9) for fraction in LEVELS]
 
 
-def normalising_length(chain: Chain) -> float:
+def normalising_length(chain: SerialChain) -> float:
     """Length [m] that makes velocities comparable with angular ones: thigh and shin.
 
     The sum of the distances between neighbouring parallel axes; the limb's size if there are none.
@@ -159,13 +160,15 @@ def normalising_length(chain: Chain) -> float:
     return total if total > 1e-3 else chain.length
 
 
-def _level(robot: Robot, chain: Chain, height: float, resolution: float, progress: Progress) -> WorkspaceMap:
+def _level(
+    robot: Robot, chain: SerialChain, height: float, resolution: float, progress: Progress
+) -> WorkspaceMap:
     """The map of one height."""
     x, y, near = _grid(chain, height, resolution)
     n, count = len(chain.joints), near.size
     cause = np.full(count, OUT_OF_REACH, dtype=np.int16)
     inverse, q = np.full(count, np.nan), np.full((count, n), np.nan)
-    length, guess = normalising_length(chain), _guess(robot, chain)
+    length, guess = normalising_length(chain), resting(robot, chain)
     tried = np.flatnonzero(near)
     for begin in range(0, len(tried), BLOCK):
         here = tried[begin : begin + BLOCK]
@@ -191,16 +194,7 @@ def _level(robot: Robot, chain: Chain, height: float, resolution: float, progres
     )
 
 
-def _guess(robot: Robot, chain: Chain) -> Array:
-    """The home posture if the table has one, else the middle of the limits."""
-    for posture in robot.postures:
-        if posture.name == "home":
-            return np.array(posture.q, dtype=float)[list(chain.joints)]
-    bounded = np.isfinite(chain.lower) & np.isfinite(chain.upper)
-    return np.where(bounded, (np.where(bounded, chain.lower, 0) + np.where(bounded, chain.upper, 0)) / 2, 0.0)
-
-
-def _grid(chain: Chain, height: float, resolution: float) -> tuple[Array, Array, Array]:
+def _grid(chain: SerialChain, height: float, resolution: float) -> tuple[Array, Array, Array]:
     """Multiples of the resolution x (X,), y (Y,), and which points (X, Y) the limb's size may allow.
 
     With the tip's orientation held, a point of the last axis moves as the tip does; from the first axis it

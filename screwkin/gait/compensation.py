@@ -33,7 +33,7 @@ from screwkin.compliance.stiffness import Method as StaticModel
 from screwkin.errors import InputError, LimitError, NoSolutionError
 from screwkin.gait.feed_forward import walking_torques
 from screwkin.gait.loads import load_distribution
-from screwkin.ik.whole_body import solve_samples
+from screwkin.ik.pose import solve_pose
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
@@ -239,7 +239,7 @@ def _reached(robot: Robot, trajectory: Trajectory, shifts: Array, guess: Array) 
     for i, foot in enumerate(trajectory.feet):
         targets[foot] = trajectory.T_world_tip[foot].copy()
         targets[foot][:, :3, 3] += shifts[:, i]
-    solution = solve_samples(robot, targets, State(trajectory.T_world_base, guess))
+    solution = solve_pose(robot, targets, State(trajectory.T_world_base, guess))
     solution.raise_on_failure(robot, trajectory.time)
     moved = (shifts != 0).any(axis=(1, 2))[:, None]
     return np.where(moved, solution.state.q, guess)

@@ -20,7 +20,7 @@ from screwkin.compiler.program import Program, Recorder, kept
 from screwkin.compiler.records import identifier
 from screwkin.ik.closed import closed_form
 from screwkin.ik.programs import cosines, wrapped
-from screwkin.kinematics.serial_chain import Chain
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.limb_motion import seen_from
 from screwkin.model.robot import Robot
 
@@ -70,7 +70,7 @@ def limb_map(robot: Robot, limb: str, guess: tuple[float, ...], length: float) -
         guess: joint positions; of the solutions inside the limits the nearest is taken.
         length: by which velocities are divided in the condition number [m].
     """
-    chain = Chain.of(robot, limb)
+    chain = SerialChain.of(robot, limb)
     recorder = Recorder(
         identifier(robot.name, chain.limb, "map"),
         f"Where {chain.limb} of {robot.name} puts its tip at a point of the base frame, oriented as in the"
@@ -95,7 +95,7 @@ def limb_map(robot: Robot, limb: str, guess: tuple[float, ...], length: float) -
     return recorder.program()
 
 
-def _judged(chain: Chain, branch: Sequence[Scalar], near: Sequence[tuple[Scalar, Scalar]]) -> _Branch:
+def _judged(chain: SerialChain, branch: Sequence[Scalar], near: Sequence[tuple[Scalar, Scalar]]) -> _Branch:
     """A branch (angles, slack) against the limits and the sines and cosines of the guess."""
     *angles, slack = branch
     q = wrapped(chain, angles)
@@ -113,7 +113,7 @@ def _judged(chain: Chain, branch: Sequence[Scalar], near: Sequence[tuple[Scalar,
     return _Branch(q, key, cause, (abs_(slack) > CLEAR) & (~valid | (abs_(beyond) > NEAR)))
 
 
-def _beyond(chain: Chain, joint: int, x: Scalar) -> tuple[Scalar, Scalar]:
+def _beyond(chain: SerialChain, joint: int, x: Scalar) -> tuple[Scalar, Scalar]:
     """How far an angle lies beyond the limits of its joint, negative inside; and if beyond the upper one."""
     low, high = float(chain.lower[joint]), float(chain.upper[joint])
     if math.isinf(low):
@@ -140,7 +140,7 @@ def _chosen(branches: Sequence[_Branch]) -> tuple[_Branch, Scalar]:
     return best, clear
 
 
-def _decided(chain: Chain, best: _Branch) -> Scalar:
+def _decided(chain: SerialChain, best: _Branch) -> Scalar:
     """Condition: if limits cut the best branch off, one of them is clearly the worst."""
     first: Scalar = -FAR
     second: Scalar = -FAR
@@ -152,7 +152,7 @@ def _decided(chain: Chain, best: _Branch) -> Scalar:
 
 
 def _conditioning(
-    chain: Chain, q: Sequence[Scalar], target: Pose, length: float, link: int
+    chain: SerialChain, q: Sequence[Scalar], target: Pose, length: float, link: int
 ) -> tuple[Extremes, Scalar]:
     """Singular values of the tip's Jacobian in the axes of a link, and the residual of the tip's pose."""
     seen = seen_from(chain.screws, q, link)
@@ -168,7 +168,7 @@ def _conditioning(
     return extreme_singular_values(columns), scalar.sqrt(turn * 0.5 + dot(tip - wanted, tip - wanted))
 
 
-def _best_link(chain: Chain, length: float) -> int:
+def _best_link(chain: SerialChain, length: float) -> int:
     """After how many joints the link stands in whose axes the singular values take least operations."""
 
     def cost(link: int) -> int:

@@ -1,7 +1,7 @@
 """What a limb reaches: joint positions and conditioning at points, or what keeps its tip from them.
 
 One way for any number of points: the limb's program where it has a closed form; points that it does not
-certify, and limbs without one, are solved by ``ik.numeric``. Ties are decided with a margin, so that the
+certify, and limbs without one, are solved by ``ik.limb``. Ties are decided with a margin, so that the
 answer at a point does not depend on the points beside it.
 """
 
@@ -14,11 +14,12 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array
 from screwkin.compiler.run import run
+from screwkin.ik.closed import recognised
+from screwkin.ik.limb import solve_limb
 from screwkin.ik.limb_map import NEAR, limb_map
-from screwkin.ik.numeric import IkSettings, solve_limb
-from screwkin.ik.programs import solvable
+from screwkin.ik.numeric import IkSettings
 from screwkin.ik.solutions import LimbSolutions
-from screwkin.kinematics.serial_chain import Chain, missing
+from screwkin.kinematics.serial_chain import SerialChain, residual
 from screwkin.model.robot import Robot
 
 REACHABLE, OUT_OF_REACH = 0, 1
@@ -38,7 +39,7 @@ class Reach(NamedTuple):
     inverse_condition: Array
 
 
-def cause_names(chain: Chain) -> tuple[str, ...]:
+def cause_names(chain: SerialChain) -> tuple[str, ...]:
     """Reachable, out of reach, then the lower and upper limit of every joint."""
     sides = [f"{name} {side}" for name in chain.names for side in ("lower", "upper")]
     return ("reachable", "out of reach", *sides)
@@ -54,11 +55,11 @@ def reach(robot: Robot, limb: str, points: Array, guess: Array, length: float) -
         guess: (n,) joint positions; of the solutions inside the limits the nearest is taken.
         length: by which velocities are divided in the condition number [m].
     """
-    chain, count = Chain.of(robot, limb), len(points)
+    chain, count = SerialChain.of(robot, limb), len(points)
     cause = np.full(count, OUT_OF_REACH, dtype=np.int16)
     q, inverse = np.full((count, len(chain.joints)), np.nan), np.full(count, np.nan)
     certified = conditioned = np.zeros(count, dtype=bool)
-    if solvable(robot, chain.limb, True):
+    if recognised(chain) is not None:
         out = run(limb_map(robot, chain.limb, tuple(guess.tolist()), length), {"point": points})
         certified, conditioned = out["certified"].T > 0
         cause, q, inverse = out["cause"][:, 0].astype(np.int16), out["q"], out["inverse"][:, 0]
@@ -76,13 +77,13 @@ def reach(robot: Robot, limb: str, points: Array, guess: Array, length: float) -
     return Reach(cause, q, inverse)
 
 
-def _targets(chain: Chain, points: Array) -> Array:
+def _targets(chain: SerialChain, points: Array) -> Array:
     target = np.tile(as_array(chain.tip).astype(float), (len(points), 1, 1))
     target[:, :3, 3] = points
     return target
 
 
-def _causes(chain: Chain, solved: LimbSolutions) -> Array:
+def _causes(chain: SerialChain, solved: LimbSolutions) -> Array:
     """(B,) index of what decides: of all branches the one least beyond the limits, and its worst joint.
 
     Of branches, and of joints, that differ by less than ``NEAR`` the first is taken.
@@ -99,9 +100,9 @@ def _causes(chain: Chain, solved: LimbSolutions) -> Array:
     return np.where(solved.in_limits.any(axis=-1), REACHABLE, reached).astype(np.int16)
 
 
-def _inverse_condition(chain: Chain, q: Array, target: Array, length: float) -> Array:
+def _inverse_condition(chain: SerialChain, q: Array, target: Array, length: float) -> Array:
     """Smallest over largest singular value (B,) of the Jacobian at the tip, velocities over a length."""
-    _, J = missing(chain, q, target)
+    _, J = residual(chain, q, target)
     J[:, 3:] /= length
     values = np.linalg.svd(J, compute_uv=False)
     return np.asarray(values[:, -1] / values[:, 0])

@@ -11,9 +11,10 @@ import screwkin as sk
 from screwkin.analysis import workspace as maps
 from screwkin.compiler.run import run
 from screwkin.ik import reach as reaching
+from screwkin.ik.limb import resting
 from screwkin.ik.limb_map import limb_map
 from screwkin.ik.reach import REACHABLE, reach
-from screwkin.kinematics.serial_chain import Chain
+from screwkin.kinematics.serial_chain import SerialChain
 from tests.compiler.robots import with_leg
 from tests.ik.legs import backwards, random_parallel_leg, random_spherical_leg
 
@@ -28,7 +29,7 @@ def points_of(chain, height, resolution):
 def by_fallback(monkeypatch, *arguments):
     """What is reached by a limb that is taken for one without a closed form's program."""
     with monkeypatch.context() as patch:
-        patch.setattr(reaching, "solvable", lambda *_: False)
+        patch.setattr(reaching, "recognised", lambda *_: None)
         return reach(*arguments)
 
 
@@ -36,8 +37,8 @@ def by_fallback(monkeypatch, *arguments):
 def agree(monkeypatch):
     def check(robot, limb, points, share=0.99):
         """Causes, positions and conditioning by both; at least a share of the samples is certified."""
-        chain = Chain.of(robot, limb)
-        length, guess = maps.normalising_length(chain), maps._guess(robot, chain)
+        chain = SerialChain.of(robot, limb)
+        length, guess = maps.normalising_length(chain), resting(robot, chain)
         cause, q, inverse = by_fallback(monkeypatch, robot, limb, points, guess, length)
         mine = reach(robot, limb, points, guess, length)
         np.testing.assert_array_equal(mine.cause, cause)
@@ -57,7 +58,7 @@ def agree(monkeypatch):
 @pytest.mark.parametrize(("name", "limb"), [("bioloid", "left_leg"), ("poppy12", "right_leg")])
 def test_maps_of_bundled_legs_are_those_of_the_fallback(agree, name, limb):
     robot = sk.load_robot(name)
-    chain = Chain.of(robot, limb)
+    chain = SerialChain.of(robot, limb)
     heights = maps.default_heights(robot, limb)
     points = np.concatenate([points_of(chain, h, 0.008 if name == "bioloid" else 0.02) for h in heights])
     causes = agree(robot, limb, points)
@@ -71,7 +72,7 @@ def test_maps_of_bundled_legs_are_those_of_the_fallback(agree, name, limb):
 )
 def test_maps_of_legs_with_any_axes(agree, leg):
     robot = with_leg(leg, 5)
-    chain = Chain.of(robot, "left_leg")
+    chain = SerialChain.of(robot, "left_leg")
     rng = np.random.default_rng(0)
     points = float(chain.tip.p.x), float(chain.tip.p.y), float(chain.tip.p.z)
     causes = agree(robot, "left_leg", points + rng.normal(size=(1500, 3)), 0.95)
@@ -87,7 +88,7 @@ def test_mirror_images_straight_legs_and_borders_are_decided_as_the_fallback_doe
         postures=(),
         joints=tuple(replace(joint, lower=-np.inf, upper=np.inf) for joint in robot.joints),
     )
-    chain = Chain.of(free, "left_leg")
+    chain = SerialChain.of(free, "left_leg")
     hip, tip = (np.array([float(c) for c in p]) for p in (chain.screws[0].s0, chain.tip.p))
     share, ankle = np.linspace(0.0, 1.0, 30)[:, None], np.array([0.0, 0.0, 0.030779])
     up, forward = share * np.array([0.0, 0.0, 0.05]), share * np.array([0.05, 0.0, 0.0])
@@ -107,7 +108,7 @@ def test_mirror_images_straight_legs_and_borders_are_decided_as_the_fallback_doe
 def test_a_level_is_the_same_by_programs_and_without_them(monkeypatch):
     robot = sk.load_robot("poppy12")
     by_program = maps.workspace(robot, "left_leg", [0.375], 0.012)[0]
-    monkeypatch.setattr(reaching, "solvable", lambda *_: False)
+    monkeypatch.setattr(reaching, "recognised", lambda *_: None)
     other = maps.workspace(robot, "left_leg", [0.375], 0.012)[0]
     np.testing.assert_array_equal(by_program.cause, other.cause)
     np.testing.assert_array_equal(by_program.x, other.x)
