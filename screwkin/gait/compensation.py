@@ -34,6 +34,7 @@ from screwkin.errors import InputError, LimitError, NoSolutionError
 from screwkin.gait.feed_forward import walking_torques
 from screwkin.gait.loads import load_distribution
 from screwkin.ik.pose import solve_pose
+from screwkin.kinematics.limits import excess, limits_of, within, worst_joint
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
@@ -51,8 +52,6 @@ WAYS: Mapping[Way, tuple[Method, Model]] = {
     "dynamic": ("joint", "dynamic"),
 }
 """Method and model by name: the foot in the air, all joints by statics, all joints by the walk's torques."""
-LIMIT_SLACK = 1e-9
-"""How far rounding may take a joint beyond its limits [rad or m]."""
 
 
 def compensate(
@@ -253,11 +252,10 @@ def change_rates(time: Array, change: Array) -> Array:
 
 
 def _check_limits(robot: Robot, trajectory: Trajectory, q: Array) -> None:
-    lower = np.array([joint.lower for joint in robot.joints])
-    upper = np.array([joint.upper for joint in robot.joints])
-    beyond = np.maximum(lower - q, q - upper)
-    if beyond.max() > LIMIT_SLACK:
-        row, i = (int(x) for x in np.unravel_index(np.argmax(beyond), beyond.shape))
+    lower, upper = limits_of(robot)
+    if not within(q, lower, upper).all():
+        row = int(excess(q, lower, upper).argmax())
+        i = int(worst_joint(q[row], lower, upper))
         factor, unit = (1e3, "mm") if robot.joints[i].type == "prismatic" else (180 / np.pi, "deg")
         raise LimitError(
             f"t = {trajectory.time[row]:.3f} s: {robot.joints[i].name} is compensated to "

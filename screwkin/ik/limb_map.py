@@ -20,6 +20,7 @@ from screwkin.compiler.program import Program, Recorder, kept
 from screwkin.compiler.records import identifier
 from screwkin.ik.closed import closed_form
 from screwkin.ik.programs import cosines, wrapped
+from screwkin.kinematics.limits import beyond
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.limb_motion import seen_from
 from screwkin.model.robot import Robot
@@ -99,29 +100,27 @@ def _judged(chain: SerialChain, branch: Sequence[Scalar], near: Sequence[tuple[S
     """A branch (angles, slack) against the limits and the sines and cosines of the guess."""
     *angles, slack = branch
     q = wrapped(chain, angles)
-    beyond: Scalar = -FAR
+    excess: Scalar = -FAR
     limit: Scalar = LIMITS
     for joint, x in enumerate(q):
         here, upper = _beyond(chain, joint, x)
-        worse = here > beyond
-        beyond = where(worse, here, beyond)
+        worse = here > excess
+        excess = where(worse, here, excess)
         limit = where(worse, where(upper, LIMITS + 2 * joint + 1, LIMITS + 2 * joint), limit)
     alike = sum(cosines(q, near))
-    valid, inside = slack > 0, beyond <= 0
-    key = where(valid, where(inside, 2 * INSIDE + alike, -beyond), 2 * OUTSIDE)
+    valid, inside = slack > 0, excess <= 0
+    key = where(valid, where(inside, 2 * INSIDE + alike, -excess), 2 * OUTSIDE)
     cause = where(valid, where(inside, 0.0, limit), 1.0)
-    return _Branch(q, key, cause, (abs_(slack) > CLEAR) & (~valid | (abs_(beyond) > NEAR)))
+    return _Branch(q, key, cause, (abs_(slack) > CLEAR) & (~valid | (abs_(excess) > NEAR)))
 
 
 def _beyond(chain: SerialChain, joint: int, x: Scalar) -> tuple[Scalar, Scalar]:
     """How far an angle lies beyond the limits of its joint, negative inside; and if beyond the upper one."""
     low, high = float(chain.lower[joint]), float(chain.upper[joint])
-    if math.isinf(low):
-        return (x - high, True) if math.isfinite(high) else (-FAR, False)
-    if math.isinf(high):
-        return low - x, False
-    middle = (low + high) / 2
-    return abs_(x - middle) - (high - low) / 2, x > middle
+    if math.isinf(low) or math.isinf(high):
+        unlimited = math.isinf(low) and math.isinf(high)
+        return (-FAR, False) if unlimited else (beyond(x, low, high), math.isinf(low))
+    return beyond(x, low, high), x > (low + high) / 2
 
 
 def _chosen(branches: Sequence[_Branch]) -> tuple[_Branch, Scalar]:

@@ -19,6 +19,7 @@ from screwkin.ik.limb import solve_limb
 from screwkin.ik.limb_map import NEAR, limb_map
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.solutions import LimbSolutions
+from screwkin.kinematics.limits import beyond
 from screwkin.kinematics.serial_chain import SerialChain, residual
 from screwkin.model.robot import Robot
 
@@ -88,14 +89,14 @@ def _causes(chain: SerialChain, solved: LimbSolutions) -> Array:
 
     Of branches, and of joints, that differ by less than ``NEAR`` the first is taken.
     """
-    below, above = chain.lower - solved.q, solved.q - chain.upper
-    beyond = np.where(solved.valid[..., None], np.maximum(below, above), np.inf)
-    worst = beyond.max(axis=-1)
+    out = np.where(solved.valid[..., None], beyond(solved.q, chain.lower, chain.upper), np.inf)
+    worst = out.max(axis=-1)
     branch = (worst <= worst.min(axis=-1, keepdims=True) + NEAR).argmax(axis=-1)
     each = np.arange(len(branch))
-    beyond, higher = beyond[each, branch], (above > below)[each, branch]
-    joint = (beyond >= beyond.max(axis=-1, keepdims=True) - NEAR).argmax(axis=-1)
-    limit = OUT_OF_REACH + 1 + 2 * joint + higher[each, joint]
+    q, out = solved.q[each, branch], out[each, branch]
+    joint = (out >= out.max(axis=-1, keepdims=True) - NEAR).argmax(axis=-1)
+    upper = q - chain.upper > chain.lower - q
+    limit = OUT_OF_REACH + 1 + 2 * joint + upper[each, joint]
     reached = np.where(solved.valid.any(axis=-1), limit, OUT_OF_REACH)
     return np.where(solved.in_limits.any(axis=-1), REACHABLE, reached).astype(np.int16)
 

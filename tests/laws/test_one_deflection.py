@@ -75,6 +75,15 @@ def test_a_deflection_does_not_depend_on_its_neighbours(name, method):
     assert (whole.converged & whole.stable).all()
 
 
+@pytest.mark.parametrize(("name", "k"), [("bioloid", 3.0), ("poppy12", 2.8)])
+def test_nor_does_one_of_joints_that_are_so_soft_that_some_collapse(name, k):
+    robot = sk.load_robot(name)
+    home = sk.home(robot)
+    q = home.q + np.random.default_rng(0).uniform(-0.5, 0.5, (150, len(home.q)))
+    whole = batch_matters_not(robot, sk.State(home.T_world_base, q), "left_foot", k, "nonlinear")
+    assert 0 < (whole.converged & whole.stable).sum() < 150
+
+
 @given(seed=st.integers(0, 50), k=st.sampled_from([40.0, 200.0, 600.0]), data=st.data())
 @settings(max_examples=8, deadline=None, derandomize=True)
 def test_nor_do_deflections_of_random_trees(seed, k, data):
