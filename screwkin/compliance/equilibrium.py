@@ -27,8 +27,8 @@ SETTLED = 1e-12
 """Largest norm of theta + torque / k [rad or m] that counts as equilibrium."""
 TOLERANCE = SETTLED / 10
 """Norm at which Newton's method stops."""
-NEAR = 0.01
-"""A residual that differs from the tolerance by less than this share of it is not certified: 1e-15 rad."""
+ROUNDING = 16 * float(np.finfo(float).eps)
+"""Rounding of a residual over the norm of theta; other orders of operations differ by up to a third of it."""
 LONGEST = 0.5
 """Largest change of a joint [rad or m] in a step; a longer step is shortened."""
 STEPS = 12
@@ -127,7 +127,7 @@ def _steps(loaded: Loaded) -> tuple[Array, Array, Array, Array]:
         out = run(program, {**loaded.inputs(rows), "theta": theta[rows]})
         here, step = out["residual"][:, 0], out["step"]
         definite = (out["stable"][:, 0] > 0) & (out["certified"][:, 0] > 0)
-        clear = np.abs(here - TOLERANCE) > NEAR * TOLERANCE
+        clear = np.abs(here - TOLERANCE) > ROUNDING * np.linalg.norm(theta[rows], axis=1)
         certified[rows] = definite & clear & (here < residual[rows])
         residual[rows] = here
         on = certified[rows] & (here > TOLERANCE)

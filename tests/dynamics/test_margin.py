@@ -122,6 +122,8 @@ def test_a_robots_program_puts_its_soles_where_its_feet_are(name, gait, path):
     wanted = support_margin(walked.zmp, soles, contact)
     np.testing.assert_allclose(found, wanted, rtol=0, atol=1e-14)
     np.testing.assert_allclose(found, walked.margin, rtol=0, atol=1e-9)
+    told["zmp"] = np.full(2, np.nan)
+    assert np.isnan(run(program, told, path=path)["margin"]).all()
 
 
 def test_a_robot_without_soles_is_told_so():

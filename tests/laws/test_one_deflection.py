@@ -11,6 +11,9 @@ from hypothesis import strategies as st
 
 import screwkin as sk
 from screwkin.analysis.workspace import workspace
+from screwkin.compiler import native
+from screwkin.compiler.run import prepare
+from screwkin.compliance.deflection import newton_step
 from screwkin.compliance.equilibrium import Loaded
 from screwkin.compliance.stiffness import static_deflection
 from screwkin.dynamics.margin import support_margin
@@ -73,6 +76,19 @@ def test_a_deflection_does_not_depend_on_its_neighbours(name, method):
     q = home.q + np.random.default_rng(0).uniform(-0.5, 0.5, (5000, len(home.q)))
     whole = batch_matters_not(robot, sk.State(home.T_world_base, q), "left_foot", 60.0, method)
     assert (whole.converged & whole.stable).all()
+
+
+@pytest.mark.skipif(not native.compiler(), reason="there is no C compiler")
+def test_nor_on_whether_its_program_was_prepared():
+    plain, prepared = (replace(sk.load_robot("poppy12")) for _ in range(2))
+    assert prepare(newton_step(prepared, "left_foot"))
+    home = sk.home(plain)
+    q = home.q + np.random.default_rng(1).uniform(-0.5, 0.5, (300, len(home.q)))
+    state = sk.State(home.T_world_base, q)
+    one, other = (static_deflection(robot, state, "left_foot", 10.0) for robot in (plain, prepared))
+    for name in ("converged", "stable", "iterations"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+    np.testing.assert_allclose(one.theta, other.theta, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize(("name", "k"), [("bioloid", 3.0), ("poppy12", 2.8)])
