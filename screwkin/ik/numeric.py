@@ -8,7 +8,7 @@ size. What has not arrived inside the limits is begun anew from a fixed set of o
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -26,6 +26,8 @@ BEND = 0.3
 """How far the second start is from the guess [rad]: it leaves the saddle of a straight limb."""
 HOPELESS = 8
 """Starts after which a sample that has arrived from none of them is given up."""
+LATER = 100
+"""Bound on the steps from every start but the first: most that arrive do so in 20."""
 BETTER = 0.99
 """Share of the residual below which the end of a later start replaces that of an earlier one."""
 
@@ -97,11 +99,12 @@ def solve_system(system: System, method: Numeric, guess: Array, settings: IkSett
         x (B, n), and the steps (B,) from the start that led there.
     """
     best = _ended(system, method, guess, settings)
+    later = replace(settings, max_iterations=min(settings.max_iterations, LATER))
     for k in range(1, settings.starts):
         at = np.flatnonzero(best.rank == 1 if k >= HOPELESS else best.rank > 0)
         if not len(at):
             break
-        end = _ended(system.part(at), method, start(system, guess[at], k), settings)
+        end = _ended(system.part(at), method, start(system, guess[at], k), later)
         better = end.rank < best.rank[at]
         nearer = _far(system, end.x, guess[at]) < _far(system, best.x[at], guess[at])
         better |= (end.rank == 1) & (best.rank[at] == 1) & nearer
