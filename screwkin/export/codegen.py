@@ -19,8 +19,9 @@ from screwkin.dynamics.newton_euler import GRAVITY
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.export.quantities import QUANTITIES, programs
 from screwkin.ik import programs as limbs
+from screwkin.ik.closed import recognised
 from screwkin.kinematics.positions import frame_pose, link_displacements
-from screwkin.kinematics.serial_chain import Chain
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.tip_motion import follows, motion
 from screwkin.model.robot import Robot
 
@@ -29,7 +30,8 @@ TOLERANCE: Mapping[Real, float] = {"double": 1e-12, "float": 1e-5}
 
 
 def _closed_limbs(robot: Robot) -> list[Program]:
-    return [limbs.limb_nearest(robot, x.name) for x in robot.limbs if limbs.solvable(robot, x.tip, True)]
+    solved = [x.name for x in robot.limbs if recognised(SerialChain.of(robot, x.name))]
+    return [limbs.limb_nearest(robot, name) for name in solved]
 
 
 def _rates(accelerations: bool) -> Callable[[Robot], list[Program]]:
@@ -128,7 +130,7 @@ def example(robot: Robot, program: Program) -> dict[str, Array]:
         pose = as_array(frame_pose(robot, D, limb.tip))
         told[identifier("T_world", limb.tip)] = T @ pose
         if program.name == identifier(robot.name, limb.name, "nearest"):
-            told |= {"T_base_tip": pose, "guess": home[list(Chain.of(robot, limb.name).joints)]}
+            told |= {"T_base_tip": pose, "guess": home[list(SerialChain.of(robot, limb.name).joints)]}
     return {g.name: told[g.name] if g.name in told else rng.uniform(-1, 1, g.shape) for g in program.inputs}
 
 
