@@ -14,7 +14,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.errors import Fault, GaitError, InputError
 from screwkin.gait.footsteps import Foothold, feet_motion, footholds
 from screwkin.gait.hands import hands_motion
-from screwkin.gait.motion import Motion, level_pose, level_twist
+from screwkin.gait.motion import Motion, carried_frame, level_pose, level_twist
 from screwkin.gait.path import path_of
 from screwkin.gait.record import Gait
 from screwkin.gait.soles import check_soles
@@ -118,14 +118,15 @@ def plan_around(
     _check_finite(gait, {"waist": waist, **feet, **hands})
     with np.errstate(all="ignore"):
         gap = check_soles(gait, stance, feet, time)
+        base = carried_frame(waist, stance.T_waist_base)
     return Plan(
         gait=gait,
         steps=steps,
         time=_kept(time),
         phase=_kept(phase.value),
-        T_world_base=_kept(level_pose(waist)),
-        base_twist=_kept(level_twist(waist.rate)),
-        base_acceleration=_kept(level_twist(waist.acceleration)),
+        T_world_base=_kept(base[0]),
+        base_twist=_kept(base[1]),
+        base_acceleration=_kept(base[2]),
         T_world_tip=_each(feet, lambda foot: level_pose(foot)),
         tip_twist=_each(feet, lambda foot: level_twist(foot.rate)),
         tip_acceleration=_each(feet, lambda foot: level_twist(foot.acceleration)),

@@ -23,9 +23,9 @@ from screwkin.gait.motion import Motion, along
 from screwkin.gait.path import path_of
 from screwkin.gait.plan import Plan, plan_around, whole_steps
 from screwkin.gait.preview import CartMotion, follow_reference, preview_gains
-from screwkin.gait.realise import differentiate, positions, stance_of
+from screwkin.gait.realise import differentiate, positions
 from screwkin.gait.record import Gait
-from screwkin.gait.stance import Stance
+from screwkin.gait.stance import Stance, stance_of
 from screwkin.kinematics.mass import center_of_mass
 from screwkin.kinematics.positions import link_displacements
 from screwkin.mechanism.mechanism import Mechanism

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import (
     Twist,
-    Vector,
     as_array,
     pose_from_array,
     twist_from_array,
@@ -19,10 +17,7 @@ from screwkin.algebra.se3 import (
 )
 from screwkin.compiler.records import identifier
 from screwkin.compiler.run import run
-from screwkin.dynamics.support import sole_corners
-from screwkin.errors import InputError
 from screwkin.gait.plan import Plan
-from screwkin.gait.stance import LEFT, RIGHT, Foot, Hand, Stance
 from screwkin.ik.loops import PoseSolution
 from screwkin.ik.whole_body import solve_samples
 from screwkin.kinematics.positions import frame_pose, link_displacements
@@ -38,49 +33,12 @@ from screwkin.mechanism.rates import (
 from screwkin.mechanism.singularity import refuse_singular
 from screwkin.mechanism.tip_motion import follows, motion
 from screwkin.mechanism.virtual_motion import primary_motion
-from screwkin.model.robot import Limb, Robot
+from screwkin.model.robot import Robot
 from screwkin.model.state import State
 
 
-def stance_of(robot: Robot) -> Stance:
-    """What a gait must know of a robot, read from its table at the home posture.
-
-    Raises:
-        InputError: a fixed base, no ``home`` posture, not one leg on either side, or a leg without sole.
-    """
-    if robot.base != "floating":
-        raise InputError(f"robot {robot.name} has a fixed base; only one with a floating base can walk")
-    if "home" not in [posture.name for posture in robot.postures]:
-        raise InputError(f"robot {robot.name} has no posture 'home'; a walk needs one with bent knees")
-    D = link_displacements(robot, list(robot.posture("home").q))
-    feet, hands, places = [], [], []
-    for limb in robot.limbs:
-        p = frame_pose(robot, D, limb.tip).p
-        side = LEFT if p.y > 0 else RIGHT
-        if limb.kind == "leg":
-            outline = tuple((float(x), float(y)) for x, y, _ in sole_corners(robot, limb.tip))
-            feet.append(Foot(limb.tip, side, outline, _body(robot, limb)))
-            places.append(abs(float(p.y)))
-        else:
-            root = robot.joints[robot.path_to(limb.link)[0]].screw.s0
-            hands.append(Hand(limb.tip, side, (float(root.x), float(root.y), float(root.z))))
-    if sorted(foot.side for foot in feet) != [RIGHT, LEFT]:
-        raise InputError(f"robot {robot.name} has {len(feet)} legs; a walk needs one on either side")
-    return Stance(sum(places) / len(places), tuple(feet), tuple(hands))
-
-
-def _body(robot: Robot, limb: Limb) -> tuple[tuple[float, float], ...]:
-    """Corners (x, y) of the boxes of a limb's last link, in the frame of its tip [m]."""
-    corners = [
-        limb.frame.inverse @ (box.center + Vector(a * box.size.x, b * box.size.y, c * box.size.z) * 0.5)
-        for box in robot.link(limb.link).boxes
-        for a, b, c in product((-1, 1), repeat=3)
-    ]
-    return tuple((float(corner.x), float(corner.y)) for corner in corners)
-
-
 @dataclass(frozen=True, eq=False)
-class Motion:
+class JointMotion:
     """Positions and their derivatives (T, n), and every limb's least singular value (T, limbs)."""
 
     q: Array
@@ -124,7 +82,7 @@ def _turns(mechanism: Mechanism, tip: str) -> bool:
     return any(name.startswith(f"{tip}.r") for name in mechanism.primary)
 
 
-def differentiate(mechanism: Mechanism, made: Plan, state: State) -> Motion:
+def differentiate(mechanism: Mechanism, made: Plan, state: State) -> JointMotion:
     """Rates and accelerations of the joints from those of the plan, through N and its derivative."""
     q, T = unstack(state.q), pose_from_array(made.T_world_base)
     if follows(robot := mechanism.robot, mechanism.secondary):
@@ -134,7 +92,7 @@ def differentiate(mechanism: Mechanism, made: Plan, state: State) -> Motion:
         if found.singular.any():
             twists = coupling_twists(mechanism, T.R, q)
             refuse_singular(mechanism, network_matrix(mechanism, twists, (len(made.time),)), found, made.time)
-        return Motion(state.q, qd, qdd, sigma, found.blocks)
+        return JointMotion(state.q, qd, qdd, sigma, found.blocks)
     twists = coupling_twists(mechanism, T.R, q)
     N = network_matrix(mechanism, twists, (len(made.time),))
     first, second = _imposed(made, 0), _imposed(made, 1)
@@ -149,7 +107,7 @@ def differentiate(mechanism: Mechanism, made: Plan, state: State) -> Motion:
     bent = secondary_accelerations(mechanism, twists, N, everything, driven)
     changes = blend(mechanism.primary_columns, driven, mechanism.secondary_columns, bent.values)
     real = [mechanism.position[name] for name in mechanism.robot.joint_names]
-    return Motion(state.q, everything[:, real], changes[:, real], secondary.sigma, secondary.blocks)
+    return JointMotion(state.q, everything[:, real], changes[:, real], secondary.sigma, secondary.blocks)
 
 
 def _imposed(made: Plan, order: int) -> dict[str, Twist]:

@@ -11,8 +11,9 @@ from screwkin.errors import InputError
 from screwkin.gait.balance import ground_margin, ground_reaction, soles_on_floor
 from screwkin.gait.plan import Plan, plan
 from screwkin.gait.preview_plan import preview_plan
-from screwkin.gait.realise import differentiate, positions, stance_of
+from screwkin.gait.realise import differentiate, positions
 from screwkin.gait.record import Gait
+from screwkin.gait.stance import stance_of
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.mechanism.choice import closed_mechanism
 from screwkin.model.robot import Robot

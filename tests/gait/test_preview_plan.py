@@ -11,7 +11,7 @@ from screwkin.gait.footsteps import footholds
 from screwkin.gait.plan import plan
 from screwkin.gait.preview import follow_reference, preview_gains
 from screwkin.gait.preview_plan import preview_plan, zmp_reference
-from screwkin.gait.realise import stance_of
+from screwkin.gait.stance import stance_of
 from screwkin.model.library import find_robot
 from screwkin.model.table import parse_robot
 
