@@ -23,6 +23,7 @@ from screwkin.gait.timing import Timing
 from screwkin.gait.waist import waist_path
 
 MOST_SAMPLES = 1_000_000  # a longer plan would fill the memory of a small computer
+LEAST_SHOWN = 2  # samples of a swing below which a trajectory does not show that the foot leaves the floor
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +78,8 @@ def plan(gait: Gait, stance: Stance, steps: int) -> Plan:
 
     Raises:
         InputError: ``steps`` is no whole number above 0.
-        GaitError: another kind of gait, a swing below the floor, too many samples, or numbers too large.
+        GaitError: another kind of gait, a swing below the floor, too many or too few samples, or numbers too
+            large.
         NoSolutionError: the feet overlap.
 
     Source: walking paper (docs/papers.md, A), eq. 16-24, generalised to arcs and to stepping sideways.
@@ -86,6 +88,7 @@ def plan(gait: Gait, stance: Stance, steps: int) -> Plan:
     if gait.kind != "geometric":
         found = f"a gait of kind {gait.kind!r} is not made of key points alone"
         raise GaitError(_where(gait), [Fault("[gait]", "kind", found, 'Give one of kind "geometric"')])
+    check_rate(gait)
     timing = Timing(gait.Tc, steps, gait.ramp)
     time = sample_times(gait, timing)
     with np.errstate(all="ignore"):  # absurd sizes are told below, in words
@@ -155,6 +158,22 @@ def sample_times(gait: Gait, timing: Timing) -> Array:
             _where(gait), [Fault("[gait]", "rate", found, f"Keep them between 2 and {MOST_SAMPLES:,}")]
         )
     return timing.samples(gait.rate)
+
+
+def check_rate(gait: Gait) -> None:
+    """Refuse a rate that does not show the swings.
+
+    Raises:
+        GaitError: fewer than ``LEAST_SHOWN`` samples while a foot is in the air.
+    """
+    liftoff, landing = gait.channels["foot_height"].at[[0, -1]]
+    swing = float(landing - liftoff) * gait.Tc
+    if swing * gait.rate < LEAST_SHOWN:
+        found = f"{gait.rate:g} per second is {swing * gait.rate:.2g} samples in a swing of {swing:.3g} s"
+        rate, Tc = LEAST_SHOWN / swing, LEAST_SHOWN * gait.Tc / (swing * gait.rate)
+        upwards = f"raise rate to {np.ceil(rate):g} or more, or Tc to {np.ceil(1e4 * Tc) / 1e4:g} s or more"
+        fix = f"This rate cannot show the swing: {upwards}"
+        raise GaitError(_where(gait), [Fault("[gait]", "rate", found, fix)])
 
 
 def whole_steps(steps: object) -> int:

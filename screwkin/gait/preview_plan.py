@@ -21,7 +21,7 @@ from screwkin.gait.balance import ground_reaction
 from screwkin.gait.footsteps import Foothold, footholds, swing_side
 from screwkin.gait.motion import Motion, along
 from screwkin.gait.path import path_of
-from screwkin.gait.plan import Plan, plan_around, whole_steps
+from screwkin.gait.plan import Plan, check_rate, plan_around, whole_steps
 from screwkin.gait.preview import CartMotion, follow_reference, preview_gains
 from screwkin.gait.realise import differentiate, positions
 from screwkin.gait.record import Gait
@@ -56,6 +56,7 @@ def preview_plan(robot: Robot, mechanism: Mechanism, gait: Gait, steps: int) -> 
     """
     steps = whole_steps(steps)
     settings = _settings(gait)
+    check_rate(gait)
     stance = stance_of(robot)
     count = round((steps + 2) * gait.Tc * gait.rate)
     time = np.arange(count) / gait.rate
