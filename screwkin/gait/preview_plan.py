@@ -25,7 +25,7 @@ from screwkin.gait.plan import Plan, check_rate, plan_around, whole_steps
 from screwkin.gait.preview import CartMotion, follow_reference, preview_gains
 from screwkin.gait.realise import differentiate, positions
 from screwkin.gait.record import Gait
-from screwkin.gait.stance import Stance, stance_of
+from screwkin.gait.stance import Stance
 from screwkin.kinematics.mass import center_of_mass
 from screwkin.kinematics.positions import link_displacements
 from screwkin.mechanism.mechanism import Mechanism
@@ -39,13 +39,13 @@ TRACKED = 1e-9
 """How closely the CoM follows its reference [m]."""
 
 
-def preview_plan(robot: Robot, mechanism: Mechanism, gait: Gait, steps: int) -> Plan:
+def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -> Plan:
     """The plan of a gait of kind ``preview``.
 
     Args:
-        robot: with two legs, soles and a ``home`` posture.
-        mechanism: its closed mechanism.
+        mechanism: of a robot with a ``home`` posture whose joints follow from base and tips.
         gait: ``dsp`` (fraction of Tc), ``horizon`` [s], ``Qe``, ``Qx``, ``R`` are its own parameters.
+        stance: feet, soles and shoulders of the robot.
         steps: number of swings, at least 1.
 
     Returns:
@@ -57,7 +57,6 @@ def preview_plan(robot: Robot, mechanism: Mechanism, gait: Gait, steps: int) -> 
     steps = whole_steps(steps)
     settings = _settings(gait)
     check_rate(gait)
-    stance = stance_of(robot)
     count = round((steps + 2) * gait.Tc * gait.rate)
     time = np.arange(count) / gait.rate
     phase = _phase(time, gait.Tc, steps)
@@ -73,8 +72,8 @@ def preview_plan(robot: Robot, mechanism: Mechanism, gait: Gait, steps: int) -> 
     if gait.com == "true":
         rest = np.zeros((1, 2))
         standing = around(CartMotion(reference[:1], rest, rest, reference[:1]), slice(1))
-        stand, q = _followed(robot, mechanism, standing, reference[:1])
-        height = _com(robot, stand, q)[0, 2]
+        stand, q = _followed(mechanism, standing, reference[:1])
+        height = _com(mechanism.robot, stand, q)[0, 2]
     gains = preview_gains(
         1 / gait.rate, height, settings["horizon"], settings["Qe"], settings["Qx"], settings["R"]
     )
@@ -82,7 +81,7 @@ def preview_plan(robot: Robot, mechanism: Mechanism, gait: Gait, steps: int) -> 
     made = around(cart)
     if gait.com == "waist":
         return replace(made, notes=("the waist is taken for the CoM",))
-    return _tracked(robot, mechanism, made, cart)
+    return _tracked(mechanism, made, cart)
 
 
 def zmp_reference(gait: Gait, stance: Stance, holds: tuple[Foothold, ...], steps: int, time: Array) -> Array:
@@ -172,35 +171,35 @@ def _com(robot: Robot, made: Plan, q: Array) -> Array:
     return np.asarray(as_array(pose_from_array(made.T_world_base) @ center_of_mass(robot, D), (len(q),)))
 
 
-def _followed(robot: Robot, mechanism: Mechanism, made: Plan, wanted: Array) -> tuple[Plan, Array]:
+def _followed(mechanism: Mechanism, made: Plan, wanted: Array) -> tuple[Plan, Array]:
     """The plan with its waist moved until the CoM stands over ``wanted`` (T, 2), and its joint positions."""
-    q = positions(robot, mechanism, made).state.q
-    share = _share(robot, mechanism, made, q)
+    q = positions(mechanism, made).state.q
+    share = _share(mechanism, made, q)
     for _ in range(20):
-        error = wanted - _com(robot, made, q)[:, :2]
+        error = wanted - _com(mechanism.robot, made, q)[:, :2]
         if np.abs(error).max() < TRACKED:
             return made, q
         made = _moved(made, _solved(share, error))
-        q = positions(robot, mechanism, made, q).state.q
+        q = positions(mechanism, made, q).state.q
     far = 1e3 * np.abs(error).max()
     raise NoSolutionError(f"the waist cannot bring the CoM to its reference; {far:.2g} mm are missing")
 
 
-def _tracked(robot: Robot, mechanism: Mechanism, made: Plan, cart: CartMotion) -> Plan:
+def _tracked(mechanism: Mechanism, made: Plan, cart: CartMotion) -> Plan:
     """The plan whose CoM of all links follows the cart, in all three derivatives."""
-    made, q = _followed(robot, mechanism, made, cart.com)
-    share, none = _share(robot, mechanism, made, q), np.zeros_like(cart.com)
-    velocity, _ = _com_rates(robot, mechanism, made, q)
+    made, q = _followed(mechanism, made, cart.com)
+    share, none = _share(mechanism, made, q), np.zeros_like(cart.com)
+    velocity, _ = _com_rates(mechanism, made, q)
     made = _driven(made, _solved(share, cart.velocity - velocity), none)
-    _, acceleration = _com_rates(robot, mechanism, made, q)
+    _, acceleration = _com_rates(mechanism, made, q)
     return _driven(made, none, _solved(share, cart.acceleration - acceleration))
 
 
-def _share(robot: Robot, mechanism: Mechanism, made: Plan, q: Array) -> Array:
+def _share(mechanism: Mechanism, made: Plan, q: Array) -> Array:
     """How the CoM moves with the waist while the feet stay, (T, 2, 2): rates are linear in the waist's."""
     none = np.zeros((len(q), 2))
-    rest, _ = _com_rates(robot, mechanism, made, q)
-    pushed = [_com_rates(robot, mechanism, _driven(made, none + e, none), q)[0] for e in np.eye(2)]
+    rest, _ = _com_rates(mechanism, made, q)
+    pushed = [_com_rates(mechanism, _driven(made, none + e, none), q)[0] for e in np.eye(2)]
     return np.stack([moved - rest for moved in pushed], axis=-1)
 
 
@@ -233,8 +232,9 @@ def _added(array: Array, by: Array, at: int = 0) -> Array:
     return changed
 
 
-def _com_rates(robot: Robot, mechanism: Mechanism, made: Plan, q: Array) -> tuple[Array, Array]:
+def _com_rates(mechanism: Mechanism, made: Plan, q: Array) -> tuple[Array, Array]:
     """Velocity and acceleration of the CoM (T, 2), with the joints that the plan asks for."""
+    robot = mechanism.robot
     motion = differentiate(mechanism, made, State(made.T_world_base, q))
     T, qd = pose_from_array(made.T_world_base), unstack(motion.qd)
     h = momentum(Bodies.of(robot, T.R, unstack(q)), qd, twist_from_array(made.base_twist))

@@ -48,21 +48,23 @@ class JointMotion:
     limbs: tuple[str, ...]
 
 
-def positions(robot: Robot, mechanism: Mechanism, made: Plan, guess: Array | None = None) -> PoseSolution:
+def positions(mechanism: Mechanism, made: Plan, guess: Array | None = None) -> PoseSolution:
     """Joint positions of a plan; ``guess`` (T, n) or (n,) defaults to the home posture.
 
     Raises:
         UnreachableError, SingularError, LimitError: names limb, sample and time.
     """
+    robot = mechanism.robot
     start = np.array(robot.posture("home").q) if guess is None else guess
-    targets = {"base": made.T_world_base, **_targets(robot, mechanism, made)}
+    targets = {"base": made.T_world_base, **_targets(mechanism, made)}
     solution = solve_samples(robot, targets, State(made.T_world_base, start))
     solution.raise_on_failure(robot, made.time)
     return solution
 
 
-def _targets(robot: Robot, mechanism: Mechanism, made: Plan) -> dict[str, Array]:
+def _targets(mechanism: Mechanism, made: Plan) -> dict[str, Array]:
     """Poses of the feet; of the hands the positions, or poses level with the waist where all is imposed."""
+    robot = mechanism.robot
     home = link_displacements(robot, list(robot.posture("home").q))
     targets: dict[str, Array] = dict(made.T_world_tip)
     for hand, position in made.hand_position.items():

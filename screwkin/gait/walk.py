@@ -9,6 +9,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, pose_from_array, unstack
 from screwkin.errors import InputError
 from screwkin.gait.balance import ground_margin, ground_reaction, soles_on_floor
+from screwkin.gait.driven import driven
 from screwkin.gait.plan import Plan, plan
 from screwkin.gait.preview_plan import preview_plan
 from screwkin.gait.realise import differentiate, positions
@@ -26,7 +27,8 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
     """The whole-body trajectory of a gait.
 
     Args:
-        robot: with two legs, soles and a ``home`` posture; arms swing if it has them.
+        robot: with two legs, soles and a ``home`` posture; arms of three joints and more swing. Joints that
+            move no limb, or more than one, rest at home.
         gait: from ``load_gait``.
         steps: number of steps, at least 1; default: the gait's own, 8 unless its file says otherwise.
         command: the command line to record in the file.
@@ -41,24 +43,27 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
     """
     _check_kinds(robot, gait)
     steps = gait.steps if steps is None else steps
-    mechanism = closed_mechanism(robot)
+    whole = stance_of(robot)
+    drive = driven(robot)
+    mechanism, stance = closed_mechanism(drive.moving), drive.stance(whole)
     if gait.kind == "preview":
-        made = preview_plan(robot, mechanism, gait, steps)
+        made = preview_plan(mechanism, gait, stance, steps)
     else:
-        made = plan(gait, stance_of(robot), steps)
-    solution = positions(robot, mechanism, made)
+        made = plan(gait, stance, steps)
+    solution = positions(mechanism, made)
     motion = differentiate(mechanism, made, solution.state)
-    tip_poses = _tip_poses(robot, made, motion.q)
+    q, qd, qdd = drive.positions(motion.q), drive.rates(motion.qd), drive.rates(motion.qdd)
+    tip_poses = _tip_poses(robot, made, q)
     zmp, com, wrench, _ = ground_reaction(
-        robot, made.T_world_base, motion.q, motion.qd, motion.qdd, made.base_twist, made.base_acceleration
+        robot, made.T_world_base, q, qd, qdd, made.base_twist, made.base_acceleration
     )
     soles = soles_on_floor(robot, made.feet, tip_poses)
     return Trajectory(
         time=made.time,
         joint_names=robot.joint_names,
-        q=motion.q,
-        qd=motion.qd,
-        qdd=motion.qdd,
+        q=q,
+        qd=qd,
+        qdd=qdd,
         T_world_base=made.T_world_base,
         base_twist=made.base_twist,
         base_acceleration=made.base_acceleration,
@@ -79,7 +84,7 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
             "boundaries": made.boundaries.tolist(),
             "closure": float(solution.residual.max()),
             "sigma": dict(zip(motion.limbs, motion.sigma.min(axis=0).tolist(), strict=True)),
-            "notes": list(made.notes),
+            "notes": [*made.notes, *drive.notes],
             "versions": {name: _version(name) for name in TRACED},
             "command": command,
         },

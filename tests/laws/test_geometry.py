@@ -9,6 +9,7 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -20,6 +21,7 @@ from tests.laws.descriptions import (
     reordered,
     seen_from,
     slid,
+    with_a_joint,
     without_boxes,
 )
 
@@ -115,3 +117,13 @@ def test_the_mirrored_robot_walks_the_mirrored_walk(gait: str, limp: float) -> N
         np.testing.assert_allclose(two.q[:, two.joint_names.index(twin)], sign * one.q[:, i], atol=1e-9)
     np.testing.assert_allclose(two.zmp * [1, -1], one.zmp, atol=1e-9)
     np.testing.assert_allclose(two.margin, one.margin, atol=1e-9)
+
+
+@pytest.mark.parametrize("gait", ["walk", "preview"])
+@pytest.mark.parametrize("parent", ["torso", "right_forearm", "left_foot_link"])
+def test_a_joint_that_no_limb_needs_rests_where_its_posture_has_it(parent: str, gait: str) -> None:
+    robot = with_a_joint(robot_of(), parent)
+    walked = sk.walk(robot, gait_of(gait), 2)
+    np.testing.assert_array_equal(walked.q[:, -1], 0.3)
+    np.testing.assert_allclose(walked.q[:, :-1], reference(gait).q, atol=1e-9)
+    np.testing.assert_allclose(walked.margin, reference(gait).margin, atol=1e-9)
