@@ -16,7 +16,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.screws import at
 from screwkin.algebra.se3 import as_array
-from screwkin.gait.held import held
+from screwkin.gait.held import with_held_joints
 from screwkin.gait.stance import Stance
 from screwkin.kinematics.positions import chain_jacobian, successive_displacement
 from screwkin.model.robot import Limb, Robot
@@ -75,6 +75,9 @@ def driven(robot: Robot) -> Driven:
 
     Legs follow poses with up to six joints of their own. Arms follow poses with six joints, positions with
     three; with fewer than three they rest. A robot with closures is driven as a whole.
+
+    Args:
+        robot: with a ``home`` posture.
     """
     home = np.array(robot.posture("home").q, dtype=float)
     if robot.closures:
@@ -83,7 +86,7 @@ def driven(robot: Robot) -> Driven:
     moving = {i for joints in chosen.values() for i in joints}
     rest = {joint.name: float(home[i]) for i, joint in enumerate(robot.joints) if i not in moving}
     resting = tuple(limb.name for limb in robot.limbs if not chosen[limb.name])
-    reduced = held(robot, rest)
+    reduced = with_held_joints(robot, rest)
     if resting:
         limbs = tuple(limb for limb in reduced.limbs if limb.name not in resting)
         reduced = replace(reduced, limbs=limbs)

@@ -14,7 +14,7 @@ from screwkin.errors import InputError
 from screwkin.model.robot import Inertia, Joint, Limb, Link, Robot, Sole
 
 
-def held(robot: Robot, positions: Mapping[str, float]) -> Robot:
+def with_held_joints(robot: Robot, positions: Mapping[str, float]) -> Robot:
     """The robot whose named joints are held: their links become one body with the links they stand on.
 
     The zero pose of what is left is the one in which the held joints stand where they are held, so joint

@@ -1,4 +1,4 @@
-"""The plan of a walk: what the virtual chains are told to do, sample by sample, in task space."""
+"""The plan of a walk: what the virtual chains impose, sample by sample, in task space."""
 
 from __future__ import annotations
 
@@ -86,12 +86,12 @@ def plan(gait: Gait, stance: Stance, steps: int) -> Plan:
     """
     steps = whole_steps(steps)
     if gait.kind != "geometric":
-        found = f"a gait of kind {gait.kind!r} is not made of key points alone"
+        found = f"a gait of kind {gait.kind!r} does not consist of key points alone"
         raise GaitError(_where(gait), [Fault("[gait]", "kind", found, 'Give one of kind "geometric"')])
     check_rate(gait)
     timing = Timing(gait.Tc, steps, gait.ramp)
     time = sample_times(gait, timing)
-    with np.errstate(all="ignore"):  # absurd sizes are told below, in words
+    with np.errstate(all="ignore"):  # absurd sizes are refused below, in words
         phase = timing.phase(time)
         progress, side = waist_path(gait, steps).motions(phase)
         waist = path_of(gait).follow(progress, side, gait.waist_height)
@@ -111,6 +111,16 @@ def plan_around(
 ) -> Plan:
     """The plan whose waist moves as given, x, y, z, yaw (T, 4), with feet and hands by the gait's phase (T,).
 
+    Args:
+        gait: swings, hands and path.
+        stance: feet, soles and shoulders of the robot.
+        steps: number of steps, at least 1.
+        time: (T,) [s].
+        phase: (T,) [steps].
+        waist: x, y, z, yaw (T, 4) of the waist in the world [m and rad].
+        boundaries: (steps + 1,) [s].
+        notes: what the reader of the plan should know.
+
     Raises:
         GaitError: a swing below the floor, or numbers too large. NoSolutionError: the feet overlap.
     """
@@ -125,21 +135,21 @@ def plan_around(
     return Plan(
         gait=gait,
         steps=steps,
-        time=_kept(time),
-        phase=_kept(phase.value),
-        T_world_base=_kept(base[0]),
-        base_twist=_kept(base[1]),
-        base_acceleration=_kept(base[2]),
+        time=_read_only(time),
+        phase=_read_only(phase.value),
+        T_world_base=_read_only(base[0]),
+        base_twist=_read_only(base[1]),
+        base_acceleration=_read_only(base[2]),
         T_world_tip=_each(feet, lambda foot: level_pose(foot)),
         tip_twist=_each(feet, lambda foot: level_twist(foot.rate)),
         tip_acceleration=_each(feet, lambda foot: level_twist(foot.acceleration)),
         hand_position=_each(hands, lambda hand: hand.value),
         hand_velocity=_each(hands, lambda hand: hand.rate),
         hand_acceleration=_each(hands, lambda hand: hand.acceleration),
-        contact=_kept(contact),
+        contact=_read_only(contact),
         feet=tuple(foot.name for foot in stance.feet),
         footholds=holds,
-        boundaries=_kept(boundaries),
+        boundaries=_read_only(boundaries),
         sole_gap=gap,
         notes=notes,
     )
@@ -147,6 +157,10 @@ def plan_around(
 
 def sample_times(gait: Gait, timing: Timing) -> Array:
     """Sample times of a walk (T,) [s].
+
+    Args:
+        gait: its rate.
+        timing: its duration.
 
     Raises:
         GaitError: fewer than two samples, or more than ``MOST_SAMPLES``.
@@ -162,6 +176,9 @@ def sample_times(gait: Gait, timing: Timing) -> Array:
 
 def check_rate(gait: Gait) -> None:
     """Refuse a rate that does not show the swings.
+
+    Args:
+        gait: its rate, ``Tc``, and the times of liftoff and landing.
 
     Raises:
         GaitError: fewer than ``LEAST_SHOWN`` samples while a foot is in the air.
@@ -207,7 +224,7 @@ def _notes(gait: Gait, timing: Timing) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _kept(array: Any) -> Any:
+def _read_only(array: Any) -> Any:
     """A read-only copy."""
     array = np.array(array)
     array.flags.writeable = False
@@ -215,4 +232,4 @@ def _kept(array: Any) -> Any:
 
 
 def _each(motions: Mapping[str, Motion], part: Any) -> Mapping[str, Array]:
-    return MappingProxyType({name: _kept(part(motion)) for name, motion in motions.items()})
+    return MappingProxyType({name: _read_only(part(motion)) for name, motion in motions.items()})

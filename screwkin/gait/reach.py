@@ -33,12 +33,14 @@ _FREEDOMS = (
 )
 
 
-def raise_on_failure(robot: Robot, made: Plan, targets: Mapping[str, Array], solution: PoseSolution) -> None:
+def refuse_unreachable(
+    robot: Robot, plan: Plan, targets: Mapping[str, Array], solution: PoseSolution
+) -> None:
     """Raise for the first sample that a robot cannot follow.
 
     Args:
         robot: the robot.
-        made: its plan.
+        plan: what it is to follow.
         targets: world poses (T, 4, 4) or positions (T, 3) of the tips, by name.
         solution: of these targets.
 
@@ -46,14 +48,14 @@ def raise_on_failure(robot: Robot, made: Plan, targets: Mapping[str, Array], sol
         UnreachableError, SingularError, LimitError: name limb, sample and time, and what to change.
     """
     try:
-        solution.raise_on_failure(robot, made.time)
+        solution.raise_on_failure(robot, plan.time)
     except (UnreachableError, LimitError) as error:
         limb, sample = robot.limb(error.limb), error.sample
         missing = _missing_freedom(robot, limb, targets[limb.tip][sample], solution, sample)
-        when = f"{limb.name}, sample {sample} (t = {float(made.time[sample]):.3f} s)"
+        when = f"{limb.name}, sample {sample} (t = {float(plan.time[sample]):.3f} s)"
         if missing:
-            raise UnreachableError(f"{when}: {missing}; {_other_gait(made)}", limb.name, sample) from None
-        error.args = (f"{error}. {_advice(robot, made, limb)}",)
+            raise UnreachableError(f"{when}: {missing}; {_other_gait(plan)}", limb.name, sample) from None
+        error.args = (f"{error}. {_advice(robot, plan, limb)}",)
         raise
 
 
@@ -93,15 +95,15 @@ def _residual(
     return np.concatenate([as_array(waist.R.T @ v).astype(float) for v in (turn, gap)])
 
 
-def _other_gait(made: Plan) -> str:
-    if made.gait.turn:
-        return f"set turn = 0 (now {made.gait.turn:.3g} rad), or choose a gait that goes straight or sideways"
-    return f"choose another gait than {made.gait.name}"
+def _other_gait(plan: Plan) -> str:
+    if plan.gait.turn:
+        return f"set turn = 0 (now {plan.gait.turn:.3g} rad), or choose a gait that goes straight or sideways"
+    return f"choose another gait than {plan.gait.name}"
 
 
-def _advice(robot: Robot, made: Plan, limb: Limb) -> str:
+def _advice(robot: Robot, plan: Plan, limb: Limb) -> str:
     """Keys of the gait that bring a limb's targets nearer, with their values now and at home."""
-    gait, back = made.gait, waist_frame(robot).inverse
+    gait, back = plan.gait, waist_frame(robot).inverse
     D = link_displacements(robot, list(robot.posture("home").q))
     tip = (back @ frame_pose(robot, D, limb.tip)).p
     if limb.kind != "leg":

@@ -18,7 +18,7 @@ from screwkin.algebra.se3 import (
 from screwkin.compiler.records import identifier
 from screwkin.compiler.run import run
 from screwkin.gait.plan import Plan
-from screwkin.gait.reach import raise_on_failure
+from screwkin.gait.reach import refuse_unreachable
 from screwkin.ik.loops import PoseSolution
 from screwkin.ik.whole_body import solve_samples
 from screwkin.kinematics.positions import frame_pose, link_displacements
@@ -59,7 +59,7 @@ def positions(mechanism: Mechanism, made: Plan, guess: Array | None = None) -> P
     start = np.array(robot.posture("home").q) if guess is None else guess
     targets = {"base": made.T_world_base, **_targets(mechanism, made)}
     solution = solve_samples(robot, targets, State(made.T_world_base, start))
-    raise_on_failure(robot, made, targets, solution)
+    refuse_unreachable(robot, made, targets, solution)
     return solution
 
 

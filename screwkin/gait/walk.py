@@ -34,7 +34,7 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
         command: the command line to record in the file.
 
     Returns:
-        Trajectory; ``meta["sigma"]`` tells the least singular value of every limb, ``meta["closure"]`` the
+        Trajectory; ``meta["sigma"]`` holds the least singular value of every limb, ``meta["closure"]`` the
         largest closure error.
 
     Raises:
@@ -47,32 +47,32 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
     drive = driven(robot)
     mechanism, stance = closed_mechanism(drive.moving), drive.stance(whole)
     if gait.kind == "preview":
-        made = preview_plan(mechanism, gait, stance, steps)
+        planned = preview_plan(mechanism, gait, stance, steps)
     else:
-        made = plan(gait, stance, steps)
-    solution = positions(mechanism, made)
-    motion = differentiate(mechanism, made, solution.state)
+        planned = plan(gait, stance, steps)
+    solution = positions(mechanism, planned)
+    motion = differentiate(mechanism, planned, solution.state)
     q, qd, qdd = drive.positions(motion.q), drive.rates(motion.qd), drive.rates(motion.qdd)
-    tip_poses = _tip_poses(robot, made, q)
+    tip_poses = _tip_poses(robot, planned, q)
     zmp, com, wrench, _ = ground_reaction(
-        robot, made.T_world_base, q, qd, qdd, made.base_twist, made.base_acceleration
+        robot, planned.T_world_base, q, qd, qdd, planned.base_twist, planned.base_acceleration
     )
-    soles = soles_on_floor(robot, made.feet, tip_poses)
+    soles = soles_on_floor(robot, planned.feet, tip_poses)
     return Trajectory(
-        time=made.time,
+        time=planned.time,
         joint_names=robot.joint_names,
         q=q,
         qd=qd,
         qdd=qdd,
-        T_world_base=made.T_world_base,
-        base_twist=made.base_twist,
-        base_acceleration=made.base_acceleration,
+        T_world_base=planned.T_world_base,
+        base_twist=planned.base_twist,
+        base_acceleration=planned.base_acceleration,
         T_world_tip=tip_poses,
-        contact=made.contact,
-        feet=made.feet,
+        contact=planned.contact,
+        feet=planned.feet,
         com=com,
         zmp=zmp,
-        margin=ground_margin(zmp, com, wrench, soles, made.contact),
+        margin=ground_margin(zmp, com, wrench, soles, planned.contact),
         meta={
             "robot": {
                 "name": robot.name,
@@ -81,10 +81,10 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
             },
             "gait": gait.to_dict(),
             "steps": steps,
-            "boundaries": made.boundaries.tolist(),
+            "boundaries": planned.boundaries.tolist(),
             "closure": float(solution.residual.max()),
             "sigma": dict(zip(motion.limbs, motion.sigma.min(axis=0).tolist(), strict=True)),
-            "notes": [*made.notes, *drive.notes],
+            "notes": [*planned.notes, *drive.notes],
             "versions": {name: _version(name) for name in TRACED},
             "command": command,
         },
@@ -96,13 +96,13 @@ def _check_kinds(robot: object, gait: object) -> None:
         raise InputError("walk takes a robot from load_robot and a gait from load_gait, not names or paths")
 
 
-def _tip_poses(robot: Robot, made: Plan, q: Array) -> dict[str, Array]:
+def _tip_poses(robot: Robot, planned: Plan, q: Array) -> dict[str, Array]:
     """Pose of every tip: feet as planned, others where the joints carry them."""
     D = link_displacements(robot, unstack(q))
-    T = pose_from_array(made.T_world_base)
+    T = pose_from_array(planned.T_world_base)
     return {
-        tip: made.T_world_tip[tip]
-        if tip in made.T_world_tip
+        tip: planned.T_world_tip[tip]
+        if tip in planned.T_world_tip
         else as_array(T @ frame_pose(robot, D, tip), (len(q),))
         for tip in robot.tip_names
     }

@@ -11,7 +11,7 @@ import screwkin as sk
 from screwkin.algebra.se3 import UNTURNED, Pose, Vector
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.gait.driven import driven
-from screwkin.gait.held import held
+from screwkin.gait.held import with_held_joints
 from screwkin.model.robot import Inertia, Link, Robot
 from screwkin.model.table import parse_robot
 from tests.cases.tables import NECK, WAIST_JOINT
@@ -47,7 +47,7 @@ def test_bodies_of_a_robot_with_held_joints_are_where_they_are_without_holding(n
     robot = sk.load_robot(name)
     rng = np.random.default_rng(1)
     q, names = rng.uniform(-1, 1, len(robot.joints)), ("right_hip_pitch", "left_elbow", "right_shoulder_roll")
-    less = held(robot, {n: q[robot.joint_names.index(n)] for n in names})
+    less = with_held_joints(robot, {n: q[robot.joint_names.index(n)] for n in names})
     left = [i for i, n in enumerate(robot.joint_names) if n not in names]
     one, two = sk.State(np.eye(4), q), sk.State(np.eye(4), q[left])
     for frame in (*robot.tip_names, *less.link_names):
@@ -94,7 +94,7 @@ def test_left_and_right_choose_the_same_joints() -> None:
 
 
 def test_an_arm_of_two_joints_rests_and_the_walk_says_so() -> None:
-    short = held(sk.load_robot("bioloid"), {"right_elbow": -0.7, "left_elbow": -0.7})
+    short = with_held_joints(sk.load_robot("bioloid"), {"right_elbow": -0.7, "left_elbow": -0.7})
     walked = sk.walk(short, sk.load_gait("walk").replace(rate=10), steps=2)
     arms = [i for i, name in enumerate(walked.joint_names) if "shoulder" in name]
     assert np.ptp(walked.q[:, arms], axis=0).max() == 0
@@ -103,6 +103,8 @@ def test_an_arm_of_two_joints_rests_and_the_walk_says_so() -> None:
 
 def test_what_cannot_be_held_is_refused() -> None:
     with pytest.raises(UnknownNameError, match="unknown joint 'tail'"):
-        held(sk.load_robot("bioloid"), {"tail": 0.0})
+        with_held_joints(sk.load_robot("bioloid"), {"tail": 0.0})
     with pytest.raises(InputError, match="has closures"):
-        held(sk.load_robot("linkages/four-bar"), {sk.load_robot("linkages/four-bar").joint_names[0]: 0.0})
+        with_held_joints(
+            sk.load_robot("linkages/four-bar"), {sk.load_robot("linkages/four-bar").joint_names[0]: 0.0}
+        )
