@@ -12,13 +12,9 @@ from screwkin.algebra.se3 import (
     Twist,
     Vector,
     as_array,
-    pose_from_array,
     twist_from_array,
-    unstack,
     vector_from_array,
 )
-from screwkin.compiler.records import identifier
-from screwkin.compiler.run import run
 from screwkin.dynamics.support import sole_corners
 from screwkin.errors import InputError
 from screwkin.gait.plan import Plan
@@ -26,18 +22,11 @@ from screwkin.gait.stance import LEFT, RIGHT, Foot, Hand, Stance
 from screwkin.ik.loops import PoseSolution
 from screwkin.ik.whole_body import solve_samples
 from screwkin.kinematics.positions import frame_pose, link_displacements
-from screwkin.mechanism.least_values import least_values
+from screwkin.mechanism.choice import RANK_TOLERANCE
+from screwkin.mechanism.joint_motion import joint_motion
 from screwkin.mechanism.mechanism import Mechanism
-from screwkin.mechanism.network import blend, coupling_twists, network_matrix
-from screwkin.mechanism.rates import (
-    SecondarySolution,
-    block_names,
-    secondary_accelerations,
-    secondary_rates,
-)
+from screwkin.mechanism.rates import block_names
 from screwkin.mechanism.singularity import refuse_singular
-from screwkin.mechanism.tip_motion import follows, motion
-from screwkin.mechanism.virtual_motion import primary_motion
 from screwkin.model.robot import Limb, Robot
 from screwkin.model.state import State
 
@@ -125,31 +114,15 @@ def _turns(mechanism: Mechanism, tip: str) -> bool:
 
 
 def differentiate(mechanism: Mechanism, made: Plan, state: State) -> Motion:
-    """Rates and accelerations of the joints from those of the plan, through N and its derivative."""
-    q, T = unstack(state.q), pose_from_array(made.T_world_base)
-    if follows(robot := mechanism.robot, mechanism.secondary):
-        qd, qdd = _compiled_motion(robot, made, state.q)
-        sigma = least_values(mechanism, made.T_world_base, state.q)
-        found = SecondarySolution(qd, sigma, block_names(mechanism))
-        if found.singular.any():
-            twists = coupling_twists(mechanism, T.R, q)
-            refuse_singular(mechanism, network_matrix(mechanism, twists, (len(made.time),)), found, made.time)
-        return Motion(state.q, qd, qdd, sigma, found.blocks)
-    twists = coupling_twists(mechanism, T.R, q)
-    N = network_matrix(mechanism, twists, (len(made.time),))
-    first, second = _imposed(made, 0), _imposed(made, 1)
-    order, batch = mechanism.primary, (len(made.time),)
-    rates = primary_motion(mechanism, T, q, first)
-    primary = as_array([rates[name] for name in order], batch)
-    secondary = secondary_rates(mechanism, N, primary)
-    refuse_singular(mechanism, N, secondary, made.time)
-    everything = blend(mechanism.primary_columns, primary, mechanism.secondary_columns, secondary.values)
-    accelerations = primary_motion(mechanism, T, q, first, second)
-    driven = as_array([accelerations[name] for name in order], batch)
-    bent = secondary_accelerations(mechanism, twists, N, everything, driven)
-    changes = blend(mechanism.primary_columns, driven, mechanism.secondary_columns, bent.values)
-    real = [mechanism.position[name] for name in mechanism.robot.joint_names]
-    return Motion(state.q, everything[:, real], changes[:, real], secondary.sigma, secondary.blocks)
+    """Rates and accelerations of the joints from those of the plan, by Davies' method.
+
+    Raises:
+        SingularError: names limb, sample and time.
+    """
+    T, q = made.T_world_base, state.q
+    found = joint_motion(mechanism, T, q, _imposed(made, 0), _imposed(made, 1))
+    refuse_singular(mechanism, T, q, found.sigma < RANK_TOLERANCE, made.time)
+    return Motion(q, found.qd, found.qdd, found.sigma, block_names(mechanism))
 
 
 def _imposed(made: Plan, order: int) -> dict[str, Twist]:
@@ -159,17 +132,3 @@ def _imposed(made: Plan, order: int) -> dict[str, Twist]:
     hands = (made.hand_velocity, made.hand_acceleration)[order]
     moved = {"waist": base, **{name: twist_from_array(value) for name, value in tips.items()}}
     return moved | {name: Twist(base.omega, vector_from_array(value)) for name, value in hands.items()}
-
-
-def _compiled_motion(robot: Robot, made: Plan, q: Array) -> tuple[Array, Array]:
-    """The same rates and accelerations by the compiled reciprocal screws of each limb."""
-    count, inputs = (len(made.time),), {"T_world_base": made.T_world_base, "q": q}
-    inputs |= {"base_twist": made.base_twist, "base_acceleration": made.base_acceleration}
-    for order, what in enumerate(("twist", "acceleration")):
-        imposed = _imposed(made, order)
-        for limb in robot.limbs:
-            told = as_array(imposed[limb.tip], count)
-            whole = len(robot.path_to(limb.link)) == 6
-            inputs[identifier(what, limb.tip)] = told if whole else told[:, 3:]
-    found = run(motion.program(robot, True), inputs)
-    return found["qd"], found["qdd"]
