@@ -147,8 +147,9 @@ def _check_closed(robot: Robot, q: Sequence[float]) -> None:
         if gap > CLOSED * length or turn > CLOSED:
             raise InputError(
                 f"{robot.name}: closure {closure.name} is open by {1e3 * gap:.3g} mm and "
-                f"{np.degrees(turn):.3g} deg at the posture where the mechanism is examined; give a posture home "
-                "that closes it, by formulas or to nine digits (mechanism.closure.nearest_closed finds one)"
+                f"{np.degrees(turn):.3g} deg at the posture where the mechanism is examined; give a posture "
+                "home that closes it, by formulas or to nine digits (mechanism.closure.nearest_closed finds "
+                "one)"
             )
 
 

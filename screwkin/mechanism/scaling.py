@@ -13,12 +13,12 @@ from screwkin.algebra.arrays import Array, numpy_of
 from screwkin.algebra.linear import cramer
 from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.screws import Screw
-from screwkin.algebra.se3 import Twist, Vector, X, Y, Z, as_array, cross, dot, norm, vector_from_array
+from screwkin.algebra.se3 import ZERO, Twist, Vector, X, Y, Z, as_array, cross, dot, norm, vector_from_array
 from screwkin.compiler.program import kept
 from screwkin.mechanism.mechanism import WAIST, Mechanism
 from screwkin.model.robot import Robot
 
-_FREE = 1e-12
+_FREE = 1e-9
 """Weight that settles a reference point along a direction that all axes share, where it does not matter."""
 
 
@@ -82,22 +82,29 @@ def _radius(screws: Sequence[Screw]) -> float:
 def centre(twists: Sequence[Twist]) -> Vector:
     """The point nearest to the axes of some screws: the sum of the squared distances is least [m].
 
+    Where all axes are parallel any point along them would do. A small weight settles it, and refinement takes
+    the weight out of the other directions again.
+
     Args:
-        twists: normalised screws at one origin; those without rotation have no line.
+        twists: normalised screws at one origin, at least one; those without rotation have no line.
     """
-    count = len(twists)
-    columns = []
-    for e in (X, Y, Z):
-        column = e * (_FREE * count)
-        for twist in twists:
-            w = twist.omega
-            column = column + e * dot(w, w) - w * dot(w, e)
-        columns.append(column)
-    lines = [cross(twist.omega, twist.v) for twist in twists]
-    wanted = lines[0]
-    for line in lines[1:]:
-        wanted = wanted + line
-    return Vector(*cramer(columns, wanted)[0])
+    columns = [e * (_FREE * len(twists)) + _apart(twists, e) for e in (X, Y, Z)]
+    wanted = ZERO
+    for twist in twists:
+        wanted = wanted + cross(twist.omega, twist.v)
+    p = Vector(*cramer(columns, wanted)[0])
+    for _ in range(2):
+        p = p + Vector(*cramer(columns, wanted - _apart(twists, p))[0])
+    return p
+
+
+def _apart(twists: Sequence[Twist], p: Vector) -> Vector:
+    """Sum of what points from every screw's axis, moved through the origin, to a point."""
+    total = ZERO
+    for twist in twists:
+        w = twist.omega
+        total = total + p * dot(w, w) - w * dot(w, p)
+    return total
 
 
 def reference_couplings(mechanism: Mechanism, circuit: Sequence[int]) -> list[int]:
