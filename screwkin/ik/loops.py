@@ -21,7 +21,7 @@ from screwkin.algebra.se3 import as_array, pose_from_array, rotation_log, unstac
 from screwkin.errors import InputError, LimitError, ShapeError, SingularError, UnreachableError
 from screwkin.kinematics.positions import chain_jacobian, successive_displacement
 from screwkin.kinematics.status import CLOSED, SINGULAR, Status
-from screwkin.mechanism.choice import characteristic_length
+from screwkin.mechanism.scaling import characteristic_length
 from screwkin.model.robot import Joint, Limb, Robot
 from screwkin.model.state import State
 

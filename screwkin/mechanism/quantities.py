@@ -15,7 +15,6 @@ from screwkin.kinematics.status import Status
 from screwkin.mechanism import davies, network, rates
 from screwkin.mechanism import virtual_motion as virtual
 from screwkin.mechanism.mechanism import Mechanism
-from screwkin.mechanism.secondary import secondary_rates as kernel_rates
 from screwkin.mechanism.singularity import refuse_singular
 from screwkin.model.state import State
 
@@ -107,37 +106,14 @@ def secondary_rates(
     primary = checked("primary_rates", primary_rates, len(mechanism.primary))
     if on_singular not in ("raise", "status"):
         raise InputError(f"on_singular is {on_singular!r}; valid: raise, status")
-    fast = _by_program(mechanism, state, primary)
-    if fast is not None:
-        values, singular = fast
-        if on_singular == "status":
-            return values, _status(singular, values.shape[:-1])
-        if not singular.any():
-            return values
-    N = network_matrix(mechanism, state)
-    solution = rates.secondary_rates(mechanism, N, primary)
-    singular = solution.singular
-    if on_singular == "status":
-        return solution.values, _status(singular.any(axis=-1), solution.values.shape[:-1])
-    refuse_singular(mechanism, N, solution)
-    return solution.values
-
-
-def _by_program(mechanism: Mechanism, state: State, primary: Array) -> tuple[Array, Array] | None:
-    """Secondary rates by the kernel, and which samples are singular; None where no program pays."""
     arrays = told(mechanism.robot, state)
     T, q = arrays["T_world_base"], arrays["q"]
-    if any(map(is_jax, (T, q, primary))):
-        return None
-    batch = one_batch({"state.T_world_base": (T, 2), "state.q": (q, 1), "primary_rates": (primary, 1)})
-    flat = [
-        np.broadcast_to(a, (*batch, *inner)).reshape(-1, *inner)
-        for a, inner in ((T, T.shape[-2:]), (q, q.shape[-1:]), (primary, primary.shape[-1:]))
-    ]
-    found = kernel_rates(mechanism, *flat)
-    if found is None:
-        return None
-    return found[0].reshape(*batch, len(mechanism.secondary)), found[1].reshape(batch)
+    one_batch({"state.T_world_base": (T, 2), "state.q": (q, 1), "primary_rates": (primary, 1)})
+    solution = rates.secondary_rates(mechanism, T, q, primary)
+    if on_singular == "status":
+        return solution.values, _status(solution.singular.any(axis=-1), solution.values.shape[:-1])
+    refuse_singular(mechanism, T, q, solution.singular)
+    return solution.values
 
 
 def _status(singular: Any, batch: tuple[int, ...]) -> Array:
