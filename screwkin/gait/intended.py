@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from screwkin.gait.compensation import change_rates
 from screwkin.gait.driven import POSE, driven
-from screwkin.ik.whole_body import solve_samples
+from screwkin.ik.pose import solve_pose
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 from screwkin.trajectory import Trajectory
@@ -34,7 +34,7 @@ def intended(robot: Robot, trajectory: Trajectory) -> Trajectory:
         whole = limb.tip in trajectory.feet or len(moving.path_to(limb.link)) >= POSE
         targets[limb.tip] = pose if whole else pose[:, :3, 3]
     guess = State(trajectory.T_world_base, trajectory.q[:, drive.joints])
-    solution = solve_samples(moving, targets, guess)
+    solution = solve_pose(moving, targets, guess)
     solution.raise_on_failure(moving, trajectory.time)
     q = drive.positions(solution.state.q)
     return replace(trajectory, q=q, qd=trajectory.qd - change_rates(trajectory.time, trajectory.q - q))

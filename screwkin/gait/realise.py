@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from screwkin.algebra.arrays import Array
@@ -16,25 +14,13 @@ from screwkin.algebra.se3 import (
 from screwkin.gait.plan import Plan
 from screwkin.gait.reach import refuse_unreachable
 from screwkin.ik.loops import PoseSolution
-from screwkin.ik.whole_body import solve_samples
+from screwkin.ik.pose import solve_pose
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.mechanism.choice import RANK_TOLERANCE
-from screwkin.mechanism.joint_motion import joint_motion
+from screwkin.mechanism.joint_motion import JointMotion, joint_motion
 from screwkin.mechanism.mechanism import Mechanism
-from screwkin.mechanism.rates import block_names
 from screwkin.mechanism.singularity import refuse_singular
 from screwkin.model.state import State
-
-
-@dataclass(frozen=True, eq=False)
-class JointMotion:
-    """Positions and their derivatives (T, n), and every limb's least singular value (T, limbs)."""
-
-    q: Array
-    qd: Array
-    qdd: Array
-    sigma: Array
-    limbs: tuple[str, ...]
 
 
 def positions(mechanism: Mechanism, planned: Plan, guess: Array | None = None) -> PoseSolution:
@@ -54,7 +40,7 @@ def positions(mechanism: Mechanism, planned: Plan, guess: Array | None = None) -
     robot = mechanism.robot
     start = np.array(robot.posture("home").q) if guess is None else guess
     targets = {"base": planned.T_world_base, **_targets(mechanism, planned)}
-    solution = solve_samples(robot, targets, State(planned.T_world_base, start))
+    solution = solve_pose(robot, targets, State(planned.T_world_base, start))
     refuse_unreachable(robot, planned, targets, solution)
     return solution
 
@@ -95,7 +81,7 @@ def differentiate(mechanism: Mechanism, planned: Plan, state: State) -> JointMot
     T, q = planned.T_world_base, state.q
     motion = joint_motion(mechanism, T, q, _imposed(planned, 0), _imposed(planned, 1))
     refuse_singular(mechanism, T, q, motion.sigma < RANK_TOLERANCE, planned.time)
-    return JointMotion(q, motion.qd, motion.qdd, motion.sigma, block_names(mechanism))
+    return motion
 
 
 def _imposed(planned: Plan, order: int) -> dict[str, Twist]:

@@ -17,6 +17,7 @@ from screwkin.gait.record import Gait
 from screwkin.gait.stance import stance_of
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.mechanism.choice import closed_mechanism
+from screwkin.mechanism.rates import block_names
 from screwkin.model.robot import Robot
 from screwkin.trajectory import Trajectory
 
@@ -52,7 +53,7 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
         planned = plan(gait, stance, steps)
     solution = positions(mechanism, planned)
     motion = differentiate(mechanism, planned, solution.state)
-    q, qd, qdd = drive.positions(motion.q), drive.rates(motion.qd), drive.rates(motion.qdd)
+    q, qd, qdd = drive.positions(solution.state.q), drive.rates(motion.qd), drive.rates(motion.qdd)
     tip_poses = _tip_poses(robot, planned, q)
     zmp, com, wrench, _ = ground_reaction(
         robot, planned.T_world_base, q, qd, qdd, planned.base_twist, planned.base_acceleration
@@ -83,7 +84,7 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
             "steps": steps,
             "boundaries": planned.boundaries.tolist(),
             "closure": float(solution.residual.max()),
-            "sigma": dict(zip(motion.limbs, motion.sigma.min(axis=0).tolist(), strict=True)),
+            "sigma": dict(zip(block_names(mechanism), motion.sigma.min(axis=0).tolist(), strict=True)),
             "notes": [*planned.notes, *drive.notes],
             "versions": {name: _version(name) for name in TRACED},
             "command": command,

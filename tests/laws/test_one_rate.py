@@ -13,7 +13,8 @@ import screwkin as sk
 from screwkin.algebra.se3 import ZERO, Twist
 from screwkin.errors import SingularError
 from screwkin.gait.plan import plan
-from screwkin.gait.realise import differentiate, positions, stance_of
+from screwkin.gait.realise import differentiate, positions
+from screwkin.gait.stance import stance_of
 from screwkin.mechanism.closure import close_loops
 from screwkin.mechanism.joint_motion import joint_motion
 from screwkin.mechanism.least_values import least_values
@@ -249,7 +250,7 @@ def plan_of_the_walk(rate: float = 5.0):
     robot, gait = sk.load_robot("bioloid"), replace(sk.load_gait("walk"), rate=rate)
     mechanism = sk.closed_mechanism(robot)
     planned = plan(gait, stance_of(robot), 4)
-    return mechanism, planned, positions(robot, mechanism, planned).state
+    return mechanism, planned, positions(mechanism, planned).state
 
 
 def test_joints_that_no_limb_needs_or_that_limbs_share_rest_in_a_walk() -> None:
