@@ -17,10 +17,11 @@ from screwkin.gait.intended import intended
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.kinematics.status import SINGULAR
 from screwkin.mechanism.choice import closed_mechanism
-from screwkin.mechanism.network import coupling_twists, network_matrix
-from screwkin.mechanism.rates import block_name, singular_values
+from screwkin.mechanism.least_values import least_values
+from screwkin.mechanism.rates import block_names
 from screwkin.mechanism.singularity import LimbSingularity, singularity_report
 from screwkin.model.robot import Robot
+from screwkin.model.state import State
 from screwkin.model.table import parse_robot
 from screwkin.trajectory import Trajectory
 
@@ -148,13 +149,10 @@ def account_of(robot: Robot, trajectory: Trajectory) -> Account:
             "positions, rates or accelerations are beyond reason"
         )
     mechanism = closed_mechanism(robot)
-    T = pose_from_array(trajectory.T_world_base)
-    twists = coupling_twists(mechanism, T.R, unstack(motion.q))
-    N = network_matrix(mechanism, twists, (trajectory.samples,))
-    sigma = singular_values(mechanism, N)
-    names = [block_name(mechanism, circuits) for circuits, _ in mechanism.blocks]
-    by_limb = {name: sigma[:, i] for i, name in enumerate(names)}
-    return Account(robot, trajectory, motion, balance, by_limb, singularity_report(mechanism, N))
+    state = State(trajectory.T_world_base, motion.q)
+    sigma = least_values(mechanism, trajectory.T_world_base, motion.q)
+    by_limb = dict(zip(block_names(mechanism), sigma.T, strict=True))
+    return Account(robot, trajectory, motion, balance, by_limb, singularity_report(mechanism, state))
 
 
 def recorded_robot(trajectory: Trajectory, path: str = "the trajectory") -> Robot:

@@ -20,7 +20,7 @@ from screwkin.analysis.chains import Chain, by_dh, by_screws, by_steps, chains_o
 from screwkin.analysis.misalignment import Misalignment, misalignment, sensitivity
 from screwkin.analysis.operations import operations
 from screwkin.errors import InputError
-from screwkin.mechanism.choice import characteristic_length
+from screwkin.mechanism.scaling import characteristic_length
 from screwkin.model.dh import DHTable, dh_fk
 from screwkin.model.robot import Robot
 

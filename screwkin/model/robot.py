@@ -117,7 +117,10 @@ class Posture:
 
 @dataclass(frozen=True, eq=False)
 class Robot:
-    """A robot or mechanism. Links and joints stand in table order; q is in the order of ``joints``."""
+    """A robot or mechanism. Links and joints stand in table order; q is in the order of ``joints``.
+
+    waist: the frame that gaits steer, fixed to the base link, in base axes; None: found from the hips.
+    """
 
     name: str
     description: str
@@ -130,6 +133,7 @@ class Robot:
     soles: tuple[Sole, ...] = ()
     closures: tuple[Closure, ...] = ()
     postures: tuple[Posture, ...] = ()
+    waist: Pose | None = None
     servos: Mapping[str, Any] = field(default_factory=dict)
     parameters: Mapping[str, Scalar] = field(default_factory=dict)
     text: str = ""

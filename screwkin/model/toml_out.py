@@ -39,6 +39,8 @@ def robot_toml(robot: Robot) -> str:
     blocks += [_block("[[closure]]", _closure(closure)) for closure in robot.closures]
     blocks += [_block("[[limb]]", _limb(limb)) for limb in robot.limbs]
     blocks += [_block("[[sole]]", _sole(sole)) for sole in robot.soles]
+    if robot.waist is not None:
+        blocks.append(_block("[waist]", _frame(robot.waist)))
     for posture in robot.postures:
         q = {name: value for name, value in zip(robot.joint_names, posture.q, strict=True) if value}
         blocks.append(

@@ -16,7 +16,7 @@ from screwkin.gait.compensation import METHODS, Remaining, compensate, convergen
 from screwkin.gait.footsteps import footholds
 from screwkin.gait.preview import follow_reference, preview_gains
 from screwkin.gait.preview_plan import zmp_reference
-from screwkin.gait.realise import stance_of
+from screwkin.gait.stance import stance_of
 from screwkin.papers.bench import Bench
 from screwkin.trajectory import Trajectory
 

@@ -41,7 +41,7 @@ def by_records(quantity: Quantity, subject, *choices, optional=(), inputs):
         for own in definition.arguments(getattr(subject, "robot", subject), given).values()
         for a in own
     ]
-    found = definition.by_formula(subject, given, choices, [inputs[name] for name in names])
+    found = definition.by_formula(subject, given, definition.chosen(choices), [inputs[name] for name in names])
     return found if isinstance(found, dict) else {definition.name: found}
 
 
@@ -136,7 +136,7 @@ def test_arguments_are_bound_as_python_binds_them() -> None:
     for args, options in (
         ((robot, state), {}),
         ((robot, state, "left_foot"), {"frame": "right_foot"}),
-        ((robot, state, "left_foot", None, 1), {}),
+        ((robot, state, "left_foot", None, "base", 1), {}),
         ((robot, state, "left_foot"), {"links": 3}),
     ):
         with pytest.raises(TypeError):
