@@ -11,11 +11,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, cast
 
-from screwkin.errors import Fault, GaitError
+from screwkin.errors import Fault, GaitError, near
 from screwkin.gait.free_path import read_free_waist
 from screwkin.gait.keypoints import CHANNELS, Channel, channel_faults, increases, read_channel
 from screwkin.gait.settings import place, valid_keys
-from screwkin.model.expression import near, resolve_parameters
+from screwkin.model.expression import resolve_parameters
 
 Kind = Literal["geometric", "preview"]
 Swing = Literal["cubic", "minimum-jerk"]

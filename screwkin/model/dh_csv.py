@@ -22,10 +22,10 @@ from pathlib import Path
 from typing import cast
 
 from screwkin.algebra.se3 import IDENTITY, Pose
-from screwkin.errors import Fault, TableError
+from screwkin.errors import Fault, TableError, near
 from screwkin.model.dh import CONVENTIONS, Convention, DHRow, DHTable, DHType, row_transform
 from screwkin.model.dh_derive import fixed_rows
-from screwkin.model.expression import listed, near
+from screwkin.model.expression import listed
 from screwkin.model.toml import read_text
 
 UNITS: Mapping[str, tuple[str, ...]] = {

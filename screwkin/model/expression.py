@@ -8,7 +8,6 @@ sympy symbols among them it is an expression.
 from __future__ import annotations
 
 import ast
-import difflib
 import math
 import operator
 from collections.abc import Callable, Iterable, Mapping
@@ -17,7 +16,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from screwkin.algebra.scalar import Scalar, is_symbolic
-from screwkin.errors import Fault, InputError
+from screwkin.errors import Fault, InputError, near
 
 CONSTANTS = ("pi", "deg", "mm")
 """Names that every table knows: pi, one degree in rad, one millimetre in m."""
@@ -48,12 +47,6 @@ class ExpressionError(InputError):
 
 class UnresolvedError(ExpressionError):
     """A formula is sound but uses a parameter that has a fault of its own, reported there."""
-
-
-def near(name: str, valid: Iterable[str]) -> str:
-    """A question for the nearest valid name, with a blank behind it: ``Did you mean 'knee'?``; or nothing."""
-    close = difflib.get_close_matches(name, list(valid), n=1)
-    return f"Did you mean {close[0]!r}? " if close else ""
 
 
 def listed(names: Iterable[str]) -> str:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from screwkin.algebra.scalar import Scalar
-from screwkin.errors import Fault
-from screwkin.model.expression import listed, near
+from screwkin.errors import Fault, near
+from screwkin.model.expression import listed
 from screwkin.model.schema import ROWS, TABLES, RobotRow, Row, kind_of, label, read_row
 
 

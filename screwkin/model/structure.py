@@ -9,8 +9,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from screwkin.errors import Fault
-from screwkin.model.expression import listed, near
+from screwkin.errors import Fault, near
+from screwkin.model.expression import listed
 from screwkin.model.mirror import closes_within, is_sided, limb_part, swapped
 from screwkin.model.rows import Entry, Rows
 
