@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from screwkin.algebra.se3 import UNTURNED, ZERO, Pose, as_array
 from screwkin.errors import InputError
 from screwkin.model.dh import DHTable, screws_from_dh
-from screwkin.model.robot import Inertia, Joint, Limb, LimbKind, Link, Robot
-from screwkin.model.table import parse_robot
+from screwkin.model.records import Inertia, Joint, Limb, LimbKind, Link, RobotRecord
+from screwkin.model.robot import Robot
 from screwkin.model.toml_out import robot_toml
 from screwkin.model.values import COUPLINGS
 
@@ -50,7 +50,7 @@ def robot_from_dh(tables: Sequence[DHTable], name: str, path: str = "<tables>") 
         limbs.append(Limb(table.name, kind, parent, table.tip, tool, COUPLINGS))
     links = [_massless(BASE, Pose(UNTURNED, ZERO))]
     links += [_massless(joint.child, Pose(UNTURNED, joint.screw.s0)) for joint in joints.values()]
-    robot = Robot(
+    robot = RobotRecord(
         name=name,
         description="",
         source="Denavit-Hartenberg tables",
@@ -60,7 +60,7 @@ def robot_from_dh(tables: Sequence[DHTable], name: str, path: str = "<tables>") 
         joints=tuple(joints.values()),
         limbs=tuple(limbs),
     )
-    return parse_robot(robot_toml(robot), path)
+    return Robot.from_text(robot_toml(robot), path)
 
 
 def _massless(name: str, frame: Pose) -> Link:

@@ -1,139 +1,75 @@
-"""The robot as a value: what a screw table says, checked and evaluated.
-
-Every point, axis, CoM, inertia, box and sole is told in the zero pose (all q = 0), in base axes from the
-base origin. Numbers are scalars: floats as a rule, sympy symbols in the symbolic twin of a table.
-"""
+"""The robot as a value: the checked records of a screw table, and questions about them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Self
 
 from screwkin.algebra.scalar import Scalar
-from screwkin.algebra.screws import Screw
 from screwkin.algebra.se3 import UNTURNED, Pose, Vector
-from screwkin.errors import UnknownNameError
+from screwkin.errors import InputError, UnknownNameError
+from screwkin.model.reading import read_table
+from screwkin.model.records import (
+    Box,
+    Closure,
+    Inertia,
+    Joint,
+    JointType,
+    Limb,
+    LimbKind,
+    Link,
+    Posture,
+    RobotRecord,
+    Sole,
+    is_open,
+    same_content,
+)
+from screwkin.model.toml_out import robot_toml
 
-JointType = Literal["revolute", "prismatic", "helical"]
-LimbKind = Literal["leg", "arm"]
-
-
-@dataclass(frozen=True)
-class Box:
-    """A box with edges along the base axes: centre and edge lengths [m]."""
-
-    center: Vector
-    size: Vector
-
-
-@dataclass(frozen=True)
-class Inertia:
-    """Rotational inertia about the CoM, in base axes [kg m^2]."""
-
-    xx: Scalar
-    yy: Scalar
-    zz: Scalar
-    xy: Scalar = 0
-    xz: Scalar = 0
-    yz: Scalar = 0
-
-    def times(self, w: Vector) -> Vector:
-        """The inertia applied to an angular velocity."""
-        return Vector(
-            w.x * self.xx + w.y * self.xy + w.z * self.xz,
-            w.x * self.xy + w.y * self.yy + w.z * self.yz,
-            w.x * self.xz + w.y * self.yz + w.z * self.zz,
-        )
-
-
-@dataclass(frozen=True)
-class Link:
-    """A rigid body: mass [kg], CoM, inertia, its own frame, and boxes for contact and pictures."""
-
-    name: str
-    mass: Scalar
-    com: Vector
-    inertia: Inertia
-    frame: Pose
-    boxes: tuple[Box, ...] = ()
-
-
-@dataclass(frozen=True)
-class Joint:
-    """A screw joint between two links, with limits in rad (m for prismatic), rad/s and N m."""
-
-    name: str
-    parent: str
-    child: str
-    type: JointType
-    screw: Screw
-    lower: float
-    upper: float
-    velocity: float
-    effort: float
-
-
-@dataclass(frozen=True)
-class Closure:
-    """Two frames on two links that must coincide: it closes a loop of the tree."""
-
-    name: str
-    link_a: str
-    frame_a: Pose
-    link_b: str
-    frame_b: Pose
-
-
-@dataclass(frozen=True)
-class Limb:
-    """A leg or an arm: its tip is a frame on its last link, where its virtual chain is attached."""
-
-    name: str
-    kind: LimbKind
-    link: str
-    tip: str
-    frame: Pose
-    chain: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Sole:
-    """The contact polygon of a leg: corners in the zero pose, counter-clockwise seen from above."""
-
-    limb: str
-    corners: tuple[Vector, ...]
-
-
-@dataclass(frozen=True)
-class Posture:
-    """Named joint positions, and the height of the base above the floor [m]."""
-
-    name: str
-    base_height: float
-    q: tuple[float, ...]
+__all__ = [
+    "Box",
+    "Closure",
+    "Inertia",
+    "Joint",
+    "JointType",
+    "Limb",
+    "LimbKind",
+    "Link",
+    "Posture",
+    "Robot",
+    "Sole",
+    "refuse_closures",
+    "robot_text",
+]
 
 
 @dataclass(frozen=True, eq=False)
-class Robot:
-    """A robot or mechanism. Links and joints stand in table order; q is in the order of ``joints``."""
+class Robot(RobotRecord):
+    """A robot or mechanism. Links and joints stand in table order; q is in the order of ``joints``.
 
-    name: str
-    description: str
-    source: str
-    base: Literal["floating", "fixed"]
-    base_link: str
-    links: tuple[Link, ...]
-    joints: tuple[Joint, ...]
-    limbs: tuple[Limb, ...] = ()
-    soles: tuple[Sole, ...] = ()
-    closures: tuple[Closure, ...] = ()
-    postures: tuple[Posture, ...] = ()
-    servos: Mapping[str, Any] = field(default_factory=dict)
-    parameters: Mapping[str, Scalar] = field(default_factory=dict)
-    text: str = ""
-    path: str = ""
+    Fields are those of ``RobotRecord``.
+    """
+
+    @classmethod
+    def from_text(cls, text: str, path: str = "<text>", symbolic: bool = False) -> Self:
+        """The robot of a table's text in TOML, see ``parse_robot``."""
+        robot = cls(**vars(read_table(text, path, symbolic)))
+        robot.__dict__["text_matches"] = True
+        return robot
+
+    @cached_property
+    def text_matches(self) -> bool:
+        """Whether ``text`` is a table of exactly this robot; ``dataclasses.replace`` leaves it behind."""
+        try:
+            return bool(self.text) and same_content(self, read_table(self.text, self.path, self._is_symbolic))
+        except InputError:
+            return False
+
+    @property
+    def _is_symbolic(self) -> bool:
+        return any(is_open(x) for x in self.parameters.values())
 
     @cached_property
     def link_names(self) -> tuple[str, ...]:
@@ -232,3 +168,30 @@ def _named(items: tuple[Any, ...], name: str, what: str) -> Any:
         if item.name == name:
             return item
     raise UnknownNameError(what, name, [item.name for item in items])
+
+
+def robot_text(robot: Robot) -> str:
+    """The text of a table that describes exactly this robot: its own, or one written from its records.
+
+    Raises:
+        InputError: the robot holds symbols that its own text does not explain.
+    """
+    return robot.text if robot.text_matches else robot_toml(robot)
+
+
+def refuse_closures(robot: Robot, what: str, instead: str) -> None:
+    """Refuse a robot with closures where only its open tree would be seen.
+
+    Args:
+        robot: any robot.
+        what: the function that sees the open tree only, such as ``"mass_matrix"``.
+        instead: what honours the closures, such as ``"secondary_rates of closed_mechanism(robot)"``.
+
+    Raises:
+        InputError: the robot has closures.
+    """
+    if robot.closures:
+        names = ", ".join(closure.name for closure in robot.closures)
+        raise InputError(
+            f"{robot.name} has closures ({names}), and {what} sees the open tree only; use {instead}"
+        )

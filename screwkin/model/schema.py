@@ -13,9 +13,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.se3 import Vector
-from screwkin.errors import Fault
-from screwkin.model.expression import listed, near
-from screwkin.model.robot import JointType, LimbKind
+from screwkin.errors import Fault, near
+from screwkin.model.expression import listed
+from screwkin.model.records import JointType, LimbKind
 from screwkin.model.values import (
     COUPLINGS,
     Chain,

@@ -19,8 +19,8 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.screws import INFINITE, Screw
 from screwkin.algebra.se3 import IDENTITY, Pose, Vector, as_array, vector_from_array
 from screwkin.errors import TableError
-from screwkin.model.robot import Box, Inertia, Joint, Link, Robot
-from screwkin.model.table import parse_robot
+from screwkin.model.records import Box, Inertia, Joint, Link, RobotRecord
+from screwkin.model.robot import Robot
 from screwkin.model.toml import read_text
 from screwkin.model.toml_out import robot_toml
 from screwkin.model.urdf_xml import TYPES, Edge, Element, Reader, base_of, named, read_joints, read_root
@@ -68,7 +68,7 @@ def parse_urdf(text: str, path: str = "<text>") -> UrdfRobot:
     bodies, moving = _bodies(reader, base, links, joints, names)
     rows = [_joint(reader, edge, pose, parent, child) for edge, pose, parent, child in moving]
     parts = [_link(body) for body in bodies]
-    robot = Robot(
+    robot = RobotRecord(
         name=_name(root.get("name", "") or "robot"),
         description="",
         source=f"URDF {Path(path).name}",
@@ -80,7 +80,7 @@ def parse_urdf(text: str, path: str = "<text>") -> UrdfRobot:
     if reader.faults:
         raise TableError(path, reader.faults)
     reader.remarks.append("URDF names no limbs, soles and postures: add those that the robot has")
-    return UrdfRobot(parse_robot(robot_toml(robot), path), tuple(dict.fromkeys(reader.remarks)))
+    return UrdfRobot(Robot.from_text(robot_toml(robot), path), tuple(dict.fromkeys(reader.remarks)))
 
 
 @dataclass
