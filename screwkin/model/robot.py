@@ -11,6 +11,7 @@ from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.se3 import UNTURNED, Pose, Vector
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.model.reading import read_table
+from screwkin.model.record_faults import check_records, vars_of
 from screwkin.model.records import (
     Box,
     Closure,
@@ -49,8 +50,14 @@ __all__ = [
 class Robot(RobotRecord):
     """A robot or mechanism. Links and joints stand in table order; q is in the order of ``joints``.
 
-    Fields are those of ``RobotRecord``.
+    Fields are those of ``RobotRecord``. However it is made, it is checked as a table file is.
+
+    Raises:
+        TableError: the records have faults; it lists all of them.
     """
+
+    def __post_init__(self) -> None:
+        check_records(self)
 
     @classmethod
     def from_text(cls, text: str, path: str = "<text>", symbolic: bool = False) -> Self:
@@ -70,6 +77,10 @@ class Robot(RobotRecord):
     @property
     def _is_symbolic(self) -> bool:
         return any(is_open(x) for x in self.parameters.values())
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields, for pickles and copies, without what is cached beside them."""
+        return vars_of(self)
 
     @cached_property
     def link_names(self) -> tuple[str, ...]:
