@@ -9,7 +9,8 @@ from typing import Any, Self
 
 from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.se3 import UNTURNED, Pose, Vector
-from screwkin.errors import InputError, UnknownNameError
+from screwkin.errors import InputError, UnknownNameError, expect
+from screwkin.model.changes import changed_text, check_followed
 from screwkin.model.reading import read_table
 from screwkin.model.record_faults import check_records, vars_of
 from screwkin.model.records import (
@@ -64,6 +65,49 @@ class Robot(RobotRecord):
         """The robot of a table's text in TOML, see ``parse_robot``."""
         robot = cls(**vars(read_table(text, path, symbolic)))
         robot.__dict__["text_matches"] = True
+        return robot
+
+    def replace(
+        self,
+        *,
+        masses: Mapping[str, float | str] | None = None,
+        limits: Mapping[str, tuple[float, float]] | None = None,
+        velocity: Mapping[str, float | str] | None = None,
+        effort: Mapping[str, float | str] | None = None,
+        name: str | None = None,
+        **parameters: float | str,
+    ) -> Self:
+        """The robot of the same table with other numbers; everything that depends on them follows.
+
+        Formulas, mirrored rows, inertias by box, soles and postures are evaluated anew, and ``text`` is the
+        table of the new robot, with its comments where the values stand in rows of their own.
+
+        Args:
+            masses: of links, by name [kg]; a mirrored link follows the one that it mirrors.
+            limits: (lower, upper) of joints, by name [rad or m]; infinite for no limit.
+            velocity: greatest speeds of joints, by name [rad/s or m/s]; infinite for no limit.
+            effort: greatest torques or forces of joints, by name [N m or N]; infinite for no limit.
+            name: of the robot.
+            **parameters: of the table, by name: numbers, or formulas over the other parameters.
+
+        Raises:
+            UnknownNameError: no such parameter, link or joint; it lists the valid ones.
+            InputError: a value that is no number, or for a mirrored row alone.
+            TableError: the new values break a rule of tables, such as a posture beyond the new limits.
+
+        Example:
+            >>> import screwkin as sk
+            >>> robot = sk.load_robot("linkages/four-bar")
+            >>> robot.replace(masses={"rocker": 0.2}).link("rocker").mass
+            0.2
+        """
+        given = {"masses": masses, "limits": limits, "velocity": velocity, "effort": effort}
+        wishes = {what: {} if wanted is None else wanted for what, wanted in given.items()}
+        for what, wanted in wishes.items():
+            expect(wanted, Mapping, what, "values by the name of their link or joint")
+        text = changed_text(self, robot_text(self), name, parameters, wishes)
+        robot = self.from_text(text, self.path, self._is_symbolic)
+        check_followed(robot, wishes)
         return robot
 
     @cached_property
