@@ -97,6 +97,12 @@ class Gait:
     path: str = ""
     _document: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
+    def __repr__(self) -> str:
+        return (
+            f"Gait {self.name!r} ({self.kind}): {self.steps} steps of {self.Tc:g} s, "
+            f"stride {self.stride:g} m, side {self.side:g} m, turn {self.turn:g} rad, rate {self.rate:g} Hz"
+        )
+
     def replace(self, **parameters: Any) -> Gait:
         """The gait with other parameters; numbers may be given as text or formulas, as on a command line.
 

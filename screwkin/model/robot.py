@@ -11,6 +11,7 @@ from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.se3 import UNTURNED, Pose, Vector
 from screwkin.errors import InputError, UnknownNameError, expect
 from screwkin.model.changes import changed_text, check_followed
+from screwkin.model.display import figure, html_table, listing
 from screwkin.model.reading import read_table
 from screwkin.model.record_faults import check_records, vars_of
 from screwkin.model.records import (
@@ -125,6 +126,35 @@ class Robot(RobotRecord):
     def __getstate__(self) -> dict[str, Any]:
         """The fields, for pickles and copies, without what is cached beside them."""
         return vars_of(self)
+
+    def __repr__(self) -> str:
+        limbs = [f"{limb.name} ({len(self.path_to(limb.link))} joints to {limb.tip})" for limb in self.limbs]
+        closures = [f"  closures: {listing(c.name for c in self.closures)}"] if self.closures else []
+        return "\n".join(
+            [
+                f"Robot {self.name!r}: {self.base} base {self.base_link!r}, {len(self.links)} links, "
+                f"{len(self.joints)} joints, {figure(self.mass)} kg",
+                f"  joints: {listing(self.joint_names)}",
+                f"  limbs: {listing(limbs)}",
+                *closures,
+            ]
+        )
+
+    def _repr_html_(self) -> str:
+        """The screw table, for notebooks."""
+        rows = [
+            [
+                joint.name,
+                joint.parent,
+                joint.child,
+                joint.type,
+                *(", ".join(map(figure, v)) for v in (joint.screw.s, joint.screw.s0)),
+                *map(figure, (joint.screw.pitch, joint.lower, joint.upper)),
+            ]
+            for joint in self.joints
+        ]
+        head = ["joint", "parent", "child", "type", "s", "s0 [m]", "pitch [m/rad]", "lower", "upper"]
+        return html_table(repr(self).splitlines()[0], head, rows)
 
     @cached_property
     def link_names(self) -> tuple[str, ...]:
