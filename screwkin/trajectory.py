@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, rotation_exp, rotation_from_array, rotation_log
-from screwkin.errors import InputError, TrajectoryError
+from screwkin.errors import InputError, TrajectoryError, expect
 from screwkin.files import atomic_write, atomic_write_bytes, npz_bytes, read_npz
+from screwkin.model.display import html_table, listing
 from screwkin.model.state import not_rigid
 
 TIP_PREFIX = "T_world_"
@@ -72,6 +73,7 @@ class Trajectory:
 
     def __post_init__(self) -> None:
         faults: list[str] = []
+        expect(self.T_world_tip, Mapping, "T_world_tip", "poses (T, 4, 4) by the name of their tip")
         for name in ("joint_names", "feet"):
             object.__setattr__(self, name, _names(name, getattr(self, name), faults))
         sizes = {
@@ -97,6 +99,31 @@ class Trajectory:
             faults += _inconsistencies(self)
         if faults:
             raise TrajectoryError("; ".join(faults))
+
+    def __reduce__(self) -> Any:
+        """For pickles and copies: made anew, checked, of its own read-only arrays."""
+        values = {f.name: getattr(self, f.name) for f in fields(self) if f.init}
+        values |= {name: dict(values[name]) for name in ("T_world_tip", "meta")}
+        return _restored, (values, self._file_sha256)
+
+    def __repr__(self) -> str:
+        way = ", ".join(f"{x + 0.0:.4g}" for x in self.T_world_base[-1, :3, 3] - self.T_world_base[0, :3, 3])
+        return (
+            f"Trajectory: {self.samples} samples in {self.duration:g} s, {len(self.joint_names)} joints, "
+            f"feet {listing(self.feet)}\n"
+            f"  the base moves by ({way}) m; margin at least {1e3 * self.margin.min():.3g} mm"
+        )
+
+    def _repr_html_(self) -> str:
+        """Shapes and ranges of the arrays, for notebooks."""
+        arrays = {k: a for k, a in _arrays(self).items() if a.dtype.kind in "fb"}
+        rows = [
+            [name, str(a.shape), *(f"{float(x):.4g}" for x in (a.min(), a.max()))]
+            if a.size
+            else [name, str(a.shape), "", ""]
+            for name, a in arrays.items()
+        ]
+        return html_table(repr(self).splitlines()[0], ["array", "shape", "least", "largest"], rows)
 
     @property
     def samples(self) -> int:
@@ -161,6 +188,7 @@ def load_trajectory(path: str | Path) -> Trajectory:
     Raises:
         TrajectoryError: not there, truncated, foreign, incomplete, inconsistent, or holding pickles.
     """
+    expect(path, (str, Path), "path", "the path of an .npz file")
     path = Path(path)
     if path.suffix in (".csv", ".json"):
         raise TrajectoryError(f"{path}: a {path.suffix} file holds the joints only; give the .npz beside it")
@@ -173,6 +201,12 @@ def load_trajectory(path: str | Path) -> Trajectory:
     except InputError as error:
         raise TrajectoryError(f"{path}: {error}") from None
     object.__setattr__(trajectory, "_file_sha256", hashlib.sha256(data).hexdigest())
+    return trajectory
+
+
+def _restored(values: Mapping[str, Any], file_sha256: str) -> Trajectory:
+    trajectory = Trajectory(**values)
+    object.__setattr__(trajectory, "_file_sha256", file_sha256)
     return trajectory
 
 
