@@ -101,7 +101,7 @@ class Trajectory:
             raise TrajectoryError("; ".join(faults))
 
     def __reduce__(self) -> Any:
-        """For pickles and copies: made anew, checked, of its own read-only arrays."""
+        """For pickles and copies: constructed anew, checked, with read-only arrays of its own."""
         values = {f.name: getattr(self, f.name) for f in fields(self) if f.init}
         values |= {name: dict(values[name]) for name in ("T_world_tip", "meta")}
         return _restored, (values, self._file_sha256)

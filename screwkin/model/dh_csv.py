@@ -7,7 +7,7 @@
 
 Angles are ``alpha_deg`` and ``offset_deg``, or ``_rad``; lengths ``a_mm`` and ``d_mm``, or ``_m``. ``limb``
 may be left out of a file of one chain, ``type`` (revolute, prismatic, fixed) where all joints are revolute.
-Fixed rows before a chain's joints are its base, fixed rows behind them its tool, and those bear the tip's
+Fixed rows before a chain's joints are its base, fixed rows behind them its tool, and those have the tip's
 name. Blank lines and lines that begin with # are comments.
 """
 

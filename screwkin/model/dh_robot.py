@@ -1,4 +1,4 @@
-"""A robot made of DH tables: the same chains as screws, without masses."""
+"""A robot from DH tables: the same chains as screws, without masses."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from screwkin.model.values import COUPLINGS
 BASE = "base_link"
 """The link from which all chains start."""
 
-_SAME = 1e-9  # rad and m: two tables that share a joint tell the same axis
+_SAME = 1e-9  # rad and m: two tables that share a joint describe the same axis
 _LEG = re.compile(r"(?<![A-Za-z])(leg|foot)(?![a-z])", re.IGNORECASE)
 _NO_LIMIT = float("inf")
 
@@ -25,7 +25,7 @@ def robot_from_dh(tables: Sequence[DHTable], name: str, path: str = "<tables>") 
     """The robot of some chains, each a limb: a leg if its name says leg or foot, else an arm.
 
     Chains that begin with the same joints share them. Links are massless and joints unlimited, as DH tables
-    tell neither; the base floats if there is a leg.
+    say neither; the base floats if there is a leg.
 
     Raises:
         InputError: chains that share a joint but not what leads to it.

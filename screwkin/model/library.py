@@ -1,4 +1,4 @@
-"""Where robots, gaits and papers are found: bundled ones by name, any other by its path."""
+"""Where robots, gaits and papers are: bundled ones by name, any other by its path."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def gait_names() -> tuple[str, ...]:
 
 
 def paper_names() -> tuple[str, ...]:
-    """Names of the bundled lists of what papers tell, to be reproduced."""
+    """Names of the bundled lists of what papers report, to be reproduced."""
     return _names(PAPERS)
 
 

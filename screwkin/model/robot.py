@@ -99,8 +99,8 @@ class Robot(RobotRecord):
         Example:
             >>> import screwkin as sk
             >>> robot = sk.load_robot("linkages/four-bar")
-            >>> robot.replace(masses={"rocker": 0.2}).link("rocker").mass
-            0.2
+            >>> robot.replace(crank=0.05).parameters["crank"]
+            0.05
         """
         given = {"masses": masses, "limits": limits, "velocity": velocity, "effort": effort}
         wishes = {what: {} if wanted is None else wanted for what, wanted in given.items()}
@@ -211,7 +211,7 @@ class Robot(RobotRecord):
         return _named(self.joints, name, "joint")
 
     def limb(self, name: str) -> Limb:
-        """The limb of that name, or the limb that bears a tip of that name."""
+        """The limb of that name, or the limb whose tip has that name."""
         for limb in self.limbs:
             if limb.tip == name:
                 return limb

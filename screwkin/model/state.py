@@ -70,7 +70,7 @@ def home(robot: Robot, posture: str = "home") -> State:
         >>> import screwkin as sk
         >>> robot = sk.load_robot("linkages/four-bar")
         >>> sk.home(robot).q.shape
-        (3,)
+        (4,)
     """
     expect(robot, Robot, "robot", 'load_robot("NAME")')
     chosen = robot.posture(posture)

@@ -1,6 +1,6 @@
 """Names and connections of a robot table: one tree of links, every name known and unique.
 
-Works on the names alone, so that a row with a wrong number is not also told to be missing.
+Works on the names alone, so that a row with a wrong number is not reported as missing too.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from screwkin.model.mirror import closes_within, is_sided, limb_part, swapped
 from screwkin.model.rows import Entry, Rows
 
 RESERVED = ("base", "waist", "floor", "world")
-"""Frames and chains of every mechanism; no tip may bear such a name."""
+"""Frames and chains of every mechanism; no tip may have such a name."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Mirrored:
 
 
 class Named(NamedTuple):
-    """A name, what bears it, and where the file says so."""
+    """A name, what has it, and where the file says so."""
 
     kind: str
     name: str
@@ -142,7 +142,7 @@ def _duplicates(named: list[Named], base: str) -> Iterator[Fault]:
             fix = 'Rename it: frame "base" is the base link\'s'
             yield Fault(where, key, "link 'base' is not base_link", fix)
         if kind == "tip" and name in links:
-            yield Fault(where, key, f"tip {name!r} bears the name of a link", "Rename the tip or the link")
+            yield Fault(where, key, f"tip {name!r} has the name of a link", "Rename the tip or the link")
         if kind == "tip" and name in RESERVED:
             yield Fault(where, key, f"tip {name!r} is a reserved name", f"Not allowed: {listed(RESERVED)}")
 
@@ -175,7 +175,7 @@ def _tree_faults(rows: Rows) -> Iterator[Fault]:
     links = {entry.text("name"): entry for entry in rows["link"]}
     complete = all(entry.text("parent") and entry.text("child") for entry in rows["joint"])
     if base not in links or not complete:
-        return  # told already; what follows would only echo it
+        return  # reported already; what follows would only echo it
     yield from _unreached(links, {child: joint for child, joint in by.items() if child != base}, base)
 
 

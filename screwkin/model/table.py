@@ -34,14 +34,14 @@ def load_robot(name_or_path: str | Path, symbolic: bool = False) -> Robot:
     Example:
         >>> import screwkin as sk
         >>> sk.load_robot("linkages/four-bar").joint_names
-        ('crank', 'coupler', 'rocker')
+        ('crank', 'crank_pin', 'rocker_pin', 'rocker')
     """
     expect(name_or_path, (str, Path), "name_or_path", "a bundled robot's name or the path of a file")
     path = find_robot(name_or_path)
     if path.suffix.lower() == ".csv":
         _only_numbers(symbolic, str(path), "a DH table")
         return robot_from_dh(load_dh(path), path.stem, str(path))
-    return robot_from_text(read_text(path, TableError), str(path), symbolic)
+    return _read(read_text(path, TableError), str(path), symbolic)
 
 
 def robot_from_text(text: str, name: str = "<text>", symbolic: bool = False) -> Robot:
@@ -62,12 +62,7 @@ def robot_from_text(text: str, name: str = "<text>", symbolic: bool = False) -> 
         'four-bar'
     """
     expect(text, str, "text", "the content of a robot's file, or call load_robot with its path")
-    if not text.lstrip("\ufeff \t\r\n").startswith("<"):
-        return parse_robot(text, name, symbolic)
-    _only_numbers(symbolic, name, "URDF")
-    read = parse_urdf(text, name)
-    warnings.warn(f"{name}: {'; '.join(read.remarks)}", stacklevel=2)
-    return read.robot
+    return _read(text, name, symbolic)
 
 
 def parse_robot(text: str, path: str = "<text>", symbolic: bool = False) -> Robot:
@@ -83,6 +78,16 @@ def parse_robot(text: str, path: str = "<text>", symbolic: bool = False) -> Robo
         TableError: the text has faults; it lists all of them.
     """
     return Robot.from_text(text, path, symbolic)
+
+
+def _read(text: str, name: str, symbolic: bool) -> Robot:
+    """The robot of a text in TOML or XML; warns its caller's caller of what URDF leaves open."""
+    if not text.lstrip("\ufeff \t\r\n").startswith("<"):
+        return parse_robot(text, name, symbolic)
+    _only_numbers(symbolic, name, "URDF")
+    read = parse_urdf(text, name)
+    warnings.warn(f"{name}: {'; '.join(read.remarks)}", stacklevel=3)
+    return read.robot
 
 
 def _only_numbers(symbolic: bool, name: str, what: str) -> None:

@@ -1,6 +1,6 @@
 """A robot written as a table: the text reads back to the same robot, number for number.
 
-Formulas and mirrored limbs are written out, as numbers and rows of their own: parameters are not kept.
+Formulas and mirrored limbs are written out, as numbers and rows of their own: parameters are not written.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""A robot read from URDF: its tree told in one frame, the base link's, in the zero pose.
+"""A robot read from URDF: its tree expressed in one frame, the base link's, in the zero pose.
 
-Fixed joints merge their bodies; collision boxes along the base axes are kept. URDF knows no limbs, soles or
-postures, so these are for the reader of the result to add. Whatever cannot be kept is told, never dropped
+Fixed joints merge their bodies; collision boxes along the base axes stay. URDF knows no limbs, soles or
+postures, so these are for the reader of the result to add. Whatever a table cannot hold is a remark, never dropped
 silently. XML with entities or external references is refused.
 """
 

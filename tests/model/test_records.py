@@ -105,7 +105,7 @@ FOREIGN = [
     ("joints", 0, {"name": 3}, "key name: found 3. Give a text"),
     ("postures", 0, {"q": (0.0,)}, "key q: has 1 positions. Give one for each of the 18 joints"),
     ("limbs", 0, {"chain": ("px", "px")}, "key chain: ['px', 'px'] has a coupling twice"),
-    ("limbs", 0, {"tip": "torso"}, "tip 'torso' bears the name of a link"),
+    ("limbs", 0, {"tip": "torso"}, "tip 'torso' has the name of a link"),
     ("soles", 0, {"corners": ()}, "key corners: 0 given"),
 ]
 
