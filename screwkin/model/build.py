@@ -37,6 +37,7 @@ def robot_from_rows(rows: Rows, joints: Sequence[Joint], mirrored: Sequence[Mirr
         soles=tuple(_soles(rows, mirrored)),
         closures=tuple(_closures(rows, mirrored)),
         postures=tuple(_postures(rows, joints)),
+        waist=None if rows.waist is None else _pose(rows.waist.row),
         servos=rows.servos,
     )
 

@@ -52,6 +52,9 @@ def check_records(robot: RobotRecord) -> None:
 def record_faults(robot: RobotRecord) -> list[Fault]:
     """All faults of a robot's records; of one with symbols, those of kinds, names and connections."""
     faults = [fault for table in _KINDS for fault in _table_faults(robot, table)]
+    if robot.waist is not None:
+        wrong = [*_misfits(robot.waist, Pose, "")] or [*_skewed(robot.waist, "")]
+        faults += [Fault("[waist]", place.lstrip("."), found, fix) for place, found, fix in wrong]
     if faults:
         return faults
     symbolic = any(True for _ in open_scalars(robot))
@@ -98,14 +101,16 @@ def _discord(robot: RobotRecord, row: Any) -> Iterator[tuple[str, str, str]]:
     if isinstance(row, Joint) and row.type == "prismatic" and not row.screw.is_translation:
         yield "screw.pitch", f"{row.screw.pitch} on a prismatic joint", "Give the pitch INFINITE"
     for f in fields(row):
-        pose = getattr(row, f.name)
-        if isinstance(pose, Pose) and not any(True for _ in open_scalars(pose)) and _is_skewed(pose):
-            yield f.name, "is no rotation", "Give orthonormal columns, right-handed"
+        if isinstance(getattr(row, f.name), Pose):
+            yield from _skewed(getattr(row, f.name), f.name)
 
 
-def _is_skewed(pose: Pose) -> bool:
+def _skewed(pose: Pose, key: str) -> Iterator[tuple[str, str, str]]:
+    if any(True for _ in open_scalars(pose)):
+        return
     R = as_array(pose.R)
-    return bool(np.abs(R @ R.T - np.eye(3)).max() > UNIT_TOLERANCE or np.linalg.det(R) < 0)
+    if np.abs(R @ R.T - np.eye(3)).max() > UNIT_TOLERANCE or np.linalg.det(R) < 0:
+        yield key, "is no rotation", "Give orthonormal columns, right-handed"
 
 
 @cache

@@ -124,6 +124,7 @@ class RobotRecord:
         base: ``floating``, or ``fixed`` to the world.
         base_link: name of the link that carries the base frame.
         links, joints, limbs, soles, closures, postures: in table order; q is in the order of ``joints``.
+        waist: the frame that gaits steer, fixed to the base link, in base axes; None: from the hips.
         servos: the table ``[servos]``, as it stands.
         parameters: values of the named parameters: floats, or symbols.
         text: of the table that it was read from; empty if there is none.
@@ -141,6 +142,7 @@ class RobotRecord:
     soles: tuple[Sole, ...] = ()
     closures: tuple[Closure, ...] = ()
     postures: tuple[Posture, ...] = ()
+    waist: Pose | None = None
     servos: Mapping[str, Any] = field(default_factory=dict)
     parameters: Mapping[str, Scalar] = field(default_factory=dict)
     text: str = ""

@@ -9,7 +9,7 @@ from typing import Any
 from screwkin.algebra.scalar import Scalar
 from screwkin.errors import Fault, near
 from screwkin.model.expression import listed
-from screwkin.model.schema import ROWS, TABLES, RobotRow, Row, kind_of, label, read_row
+from screwkin.model.schema import ROWS, TABLES, FrameRow, RobotRow, Row, kind_of, label, read_row
 
 
 @dataclass(frozen=True)
@@ -28,9 +28,10 @@ class Entry:
 
 @dataclass(frozen=True)
 class Rows:
-    """All rows of a table by their key; ``robot`` is the only one without a number."""
+    """All rows of a table by their key; ``robot`` and ``waist`` stand once, ``waist`` or not at all."""
 
     robot: Entry
+    waist: Entry | None
     entries: Mapping[str, tuple[Entry, ...]]
     servos: Mapping[str, Any]
 
@@ -60,6 +61,8 @@ def read_rows(
         return Entry(where, raw if isinstance(raw, dict) else {}, row)
 
     robot = entry(RobotRow, data.get("robot", {}), "[robot]")
+    given = data.get("waist")
+    waist = entry(FrameRow, given, "[waist]") if isinstance(given, dict) else None
     entries = {
         table: tuple(
             entry(kind_of(table, raw), raw, label(table, i, raw)) for i, raw in enumerate(_array(data, table))
@@ -67,7 +70,7 @@ def read_rows(
         for table in ROWS
     }
     servos = data.get("servos", {})
-    return Rows(robot, entries, servos if isinstance(servos, dict) else {}), faults
+    return Rows(robot, waist, entries, servos if isinstance(servos, dict) else {}), faults
 
 
 def parameters_of(data: Mapping[str, Any]) -> Mapping[str, object]:

@@ -155,7 +155,7 @@ ROWS: Mapping[str, type[Row]] = {
 }
 """Arrays of tables, by their key."""
 
-TABLES = ("robot", "parameters", *ROWS, "servos")
+TABLES = ("robot", "parameters", "waist", *ROWS, "servos")
 """All keys at the top of a file."""
 
 _PARTS: Mapping[str, type[Row]] = {

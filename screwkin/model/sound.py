@@ -79,6 +79,7 @@ def _is_tree(base: str, links: set[str], joints: Sequence[Joint]) -> bool:
 def _numbers_certified(robot: RobotRecord) -> bool:
     joints, limbs, closures = robot.joints, robot.limbs, robot.closures
     frames = [link.frame for link in robot.links] + [limb.frame for limb in limbs]
+    frames += [] if robot.waist is None else [robot.waist]
     frames += [frame for closure in closures for frame in (closure.frame_a, closure.frame_b)]
     boxes = [box for link in robot.links for box in link.boxes]
     points = [link.com for link in robot.links] + [joint.screw.s0 for joint in joints]

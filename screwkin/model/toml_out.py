@@ -48,6 +48,7 @@ def table_data(robot: RobotRecord) -> dict[str, Any]:
         "closure": [_closure(closure) for closure in robot.closures],
         "limb": [_limb(limb) for limb in robot.limbs],
         "sole": [_sole(sole) for sole in robot.soles],
+        "waist": {} if robot.waist is None else _frame(robot.waist),
         "posture": [_posture(posture, robot) for posture in robot.postures],
         "servos": dict(robot.servos),
     }

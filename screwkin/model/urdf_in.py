@@ -1,8 +1,8 @@
 """A robot read from URDF: its tree expressed in one frame, the base link's, in the zero pose.
 
 Fixed joints merge their bodies; collision boxes along the base axes stay. URDF knows no limbs, soles or
-postures, so these are for the reader of the result to add. Whatever a table cannot hold is a remark, never dropped
-silently. XML with entities or external references is refused.
+postures, so these are for the reader of the result to add. Whatever a table cannot hold is a remark, never
+dropped silently. XML with entities or external references is refused.
 """
 
 from __future__ import annotations

@@ -115,6 +115,17 @@ def test_what_only_records_can_get_wrong_is_named(table: str, index: int, change
     assert words in faults_of(with_row(BIOLOID, table, index, **change))[0]
 
 
+def test_a_waist_is_checked_too() -> None:
+    turned = Pose(Rotation(Y, -X, Z), Vector(0.1, 0, 0))
+    assert robot_text(replace(BIOLOID, waist=turned)).count("[waist]") == 1
+    for waist, words in (
+        (Pose(Rotation(X, Y, -Z), Vector(0, 0, 0)), "[waist]: is no rotation"),
+        (Pose(Rotation(X, Y, Z), Vector(0, 0, math.inf)), "[waist], key xyz: inf is not finite"),
+        (Vector(0, 0, 0), "[waist]: found Vector"),
+    ):
+        assert words in faults_of(RobotRecord(**{**vars_of(BIOLOID), "waist": waist}))[0]
+
+
 def test_a_pitch_must_fit_the_type_of_its_joint() -> None:
     screw = replace(BIOLOID.joints[3].screw, pitch=0.01)
     (fault,) = faults_of(with_row(BIOLOID, "joints", 3, screw=screw))
