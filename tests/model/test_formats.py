@@ -64,7 +64,7 @@ def test_a_text_is_read_whichever_it_is() -> None:
 
 
 def test_what_cannot_be_read_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(UnknownNameError, match="unknown robot file 'none.urdf'"):
+    with pytest.raises(UnknownNameError, match=r"unknown robot file 'none\.urdf'"):
         load_robot("none.urdf")
     with pytest.raises(TableError, match="mine: "):
         robot_from_text("name = 3", "mine")
