@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterable, Sequence
-from html import escape
 
 from screwkin.algebra.scalar import Scalar
 
@@ -21,9 +20,10 @@ def figure(x: Scalar) -> str:
 
 def html_table(title: str, head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     """A small HTML table; every text in it is escaped."""
-    lines = [f"<table><caption>{escape(title)}</caption>", _line("th", head)]
-    return "\n".join([*lines, *(_line("td", row) for row in rows), "</table>"])
+    from html import escape
 
+    def line(tag: str, cells: Sequence[str]) -> str:
+        return "<tr>" + "".join(f"<{tag}>{escape(cell)}</{tag}>" for cell in cells) + "</tr>"
 
-def _line(tag: str, cells: Sequence[str]) -> str:
-    return "<tr>" + "".join(f"<{tag}>{escape(cell)}</{tag}>" for cell in cells) + "</tr>"
+    lines = [f"<table><caption>{escape(title)}</caption>", line("th", head)]
+    return "\n".join([*lines, *(line("td", row) for row in rows), "</table>"])

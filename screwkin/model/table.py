@@ -6,12 +6,9 @@ import warnings
 from pathlib import Path
 
 from screwkin.errors import InputError, TableError, expect
-from screwkin.model.dh_csv import load_dh
-from screwkin.model.dh_robot import robot_from_dh
 from screwkin.model.library import find_robot
 from screwkin.model.robot import Robot
 from screwkin.model.toml import read_text
-from screwkin.model.urdf_in import parse_urdf
 
 
 def load_robot(name_or_path: str | Path, symbolic: bool = False) -> Robot:
@@ -39,6 +36,9 @@ def load_robot(name_or_path: str | Path, symbolic: bool = False) -> Robot:
     expect(name_or_path, (str, Path), "name_or_path", "a bundled robot's name or the path of a file")
     path = find_robot(name_or_path)
     if path.suffix.lower() == ".csv":
+        from screwkin.model.dh_csv import load_dh
+        from screwkin.model.dh_robot import robot_from_dh
+
         _only_numbers(symbolic, str(path), "a DH table")
         return robot_from_dh(load_dh(path), path.stem, str(path))
     return _read(read_text(path, TableError), str(path), symbolic)
@@ -84,6 +84,8 @@ def _read(text: str, name: str, symbolic: bool) -> Robot:
     """The robot of a text in TOML or XML; warns its caller's caller of what URDF leaves open."""
     if not text.lstrip("\ufeff \t\r\n").startswith("<"):
         return parse_robot(text, name, symbolic)
+    from screwkin.model.urdf_in import parse_urdf
+
     _only_numbers(symbolic, name, "URDF")
     read = parse_urdf(text, name)
     warnings.warn(f"{name}: {'; '.join(read.remarks)}", stacklevel=3)
