@@ -12,7 +12,7 @@ from typing import NamedTuple
 from screwkin.errors import Fault, near
 from screwkin.model.expression import listed
 from screwkin.model.mirror import closes_within, is_sided, limb_part, swapped
-from screwkin.model.rows import Entry, Rows
+from screwkin.model.rows import Rows, TableEntry
 
 RESERVED = ("base", "waist", "floor", "world")
 """Frames and chains of every mechanism; no tip may have such a name."""
@@ -81,11 +81,11 @@ def mirrored_limbs(rows: Rows) -> tuple[list[Mirrored], list[Fault]]:
     return found, faults
 
 
-def _is_mirror(entry: Entry) -> bool:
+def _is_mirror(entry: TableEntry) -> bool:
     return "mirror" in entry.raw or "of" in entry.raw
 
 
-def _sideless(rows: Rows, entry: Entry, source: Entry, part: tuple[str, ...]) -> Iterator[Fault]:
+def _sideless(rows: Rows, entry: TableEntry, source: TableEntry, part: tuple[str, ...]) -> Iterator[Fault]:
     """Everything that is reflected needs right or left in its name, to have another one."""
     joints = [e.text("name") for e in rows["joint"] if e.text("child") in part]
     fix = "Put right or left into its name, as in right_knee"
@@ -162,7 +162,7 @@ def _unknown(rows: Rows, named: list[Named]) -> Iterator[Fault]:
 
 def _tree_faults(rows: Rows) -> Iterator[Fault]:
     """Every link but the base hangs by exactly one joint from the base."""
-    base, by = rows.robot.text("base_link"), dict[str, Entry]()
+    base, by = rows.robot.text("base_link"), dict[str, TableEntry]()
     for entry in rows["joint"]:
         child = entry.text("child")
         if child and child == base:
@@ -179,7 +179,7 @@ def _tree_faults(rows: Rows) -> Iterator[Fault]:
     yield from _unreached(links, {child: joint for child, joint in by.items() if child != base}, base)
 
 
-def _unreached(links: dict[str, Entry], by: dict[str, Entry], base: str) -> Iterator[Fault]:
+def _unreached(links: dict[str, TableEntry], by: dict[str, TableEntry], base: str) -> Iterator[Fault]:
     in_circle: set[str] = set()
     for name, entry in links.items():
         if name and name != base and name not in by:
