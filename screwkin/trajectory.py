@@ -116,11 +116,9 @@ class Trajectory:
 
     def _repr_html_(self) -> str:
         """Shapes and ranges of the arrays, for notebooks."""
-        arrays = {k: a for k, a in _arrays(self).items() if a.dtype.kind in "fb"}
+        arrays = {name: array for name, array in _arrays(self).items() if array.dtype.kind == "f"}
         rows = [
-            [name, str(a.shape), *(f"{float(x):.4g}" for x in (a.min(), a.max()))]
-            if a.size
-            else [name, str(a.shape), "", ""]
+            [name, str(a.shape), *(f"{x:.4g}" for x in (a.min(initial=np.inf), a.max(initial=-np.inf)))]
             for name, a in arrays.items()
         ]
         return html_table(repr(self).splitlines()[0], ["array", "shape", "least", "largest"], rows)
@@ -144,6 +142,12 @@ class Trajectory:
         """Joint positions and rates at other times, (..., n) each, by cubic Hermite interpolation of q, qd.
 
         Before the first and after the last sample the motion rests there.
+
+        Args:
+            times: (...,) [s].
+
+        Returns:
+            q (..., n) [rad or m], and qd (..., n) per second.
         """
         return _hermite(self.time, self.q, self.qd, np.asarray(times, dtype=float))
 
@@ -152,6 +156,9 @@ class Trajectory:
 
         The origin moves on the cubic Hermite spline of its positions and velocities, the orientation turns
         evenly from sample to sample.
+
+        Args:
+            times: (...,) [s].
         """
         times = np.asarray(times, dtype=float)
         T = np.zeros((*times.shape, 4, 4))
@@ -165,6 +172,12 @@ class Trajectory:
 
     def save(self, path: str | Path) -> Path:
         """Write ``.npz``, ``.csv`` or ``.json``, by the suffix of the path.
+
+        Args:
+            path: of the new file; one that exists is replaced.
+
+        Returns:
+            The path.
 
         Raises:
             TrajectoryError: another suffix.
@@ -185,7 +198,11 @@ class Trajectory:
 def load_trajectory(path: str | Path) -> Trajectory:
     """The trajectory of an ``.npz`` file, checked.
 
+    Args:
+        path: of the file.
+
     Raises:
+        InputError: not a path.
         TrajectoryError: not there, truncated, foreign, incomplete, inconsistent, or holding pickles.
     """
     expect(path, (str, Path), "path", "the path of an .npz file")

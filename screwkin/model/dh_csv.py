@@ -47,6 +47,9 @@ _ONLY = "chain"  # name of a chain that has none
 def load_dh(path: str | Path) -> tuple[DHTable, ...]:
     """The chains of a file, in its order.
 
+    Args:
+        path: of a CSV file as the module's head describes.
+
     Raises:
         TableError: the file cannot be read or has faults; it lists all of them.
     """
@@ -55,6 +58,10 @@ def load_dh(path: str | Path) -> tuple[DHTable, ...]:
 
 def parse_dh(text: str, path: str = "<text>") -> tuple[DHTable, ...]:
     """The chains of a text.
+
+    Args:
+        text: CSV as the module's head describes.
+        path: where it comes from, for messages.
 
     Raises:
         TableError: the text has faults; it lists all of them.

@@ -91,6 +91,11 @@ def dh_from_screws(
 def dh_from_limb(robot: Robot, limb: str, convention: Convention = "modified") -> DHTable:
     """The table of a limb, from the robot's base frame to the limb's tip, with the joints' names.
 
+    Args:
+        robot: any robot of numbers.
+        limb: name of the limb or of its tip.
+        convention: ``standard`` or ``modified``.
+
     Raises:
         UnknownNameError: no such limb or convention.
         InputError: the limb has a helical joint.

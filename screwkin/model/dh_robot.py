@@ -27,6 +27,11 @@ def robot_from_dh(tables: Sequence[DHTable], name: str, path: str = "<tables>") 
     Chains that begin with the same joints share them. Links are massless and joints unlimited, as DH tables
     say neither; the base floats if there is a leg.
 
+    Args:
+        tables: one for each limb.
+        name: of the robot.
+        path: where they come from, for messages and for ``Robot.path``.
+
     Raises:
         InputError: chains that share a joint but not what leads to it.
         TableError: names that a table does not allow.

@@ -29,6 +29,7 @@ from screwkin.model.records import (
     is_open,
     same_content,
 )
+from screwkin.model.sound import are_inertias
 from screwkin.model.toml_out import robot_toml
 
 __all__ = [
@@ -194,7 +195,7 @@ class Robot(RobotRecord):
         return tuple(order)
 
     def path_to(self, link: str) -> tuple[int, ...]:
-        """Indices of the joints from the base to a link, in that order."""
+        """Indices of the joints from the base to a link, in that order; none for the base link."""
         path: list[int] = []
         while link != self.base_link:
             i = self.joint_above[link]
@@ -203,26 +204,32 @@ class Robot(RobotRecord):
         return tuple(reversed(path))
 
     def link(self, name: str) -> Link:
-        """The link of that name."""
+        """The link of that name; UnknownNameError lists the valid ones."""
         return _named(self.links, name, "link")
 
     def joint(self, name: str) -> Joint:
-        """The joint of that name."""
+        """The joint of that name; UnknownNameError lists the valid ones."""
         return _named(self.joints, name, "joint")
 
     def limb(self, name: str) -> Limb:
-        """The limb of that name, or the limb whose tip has that name."""
+        """The limb of that name, or the limb whose tip has that name; UnknownNameError lists the limbs."""
         for limb in self.limbs:
             if limb.tip == name:
                 return limb
         return _named(self.limbs, name, "limb")
 
     def posture(self, name: str) -> Posture:
-        """The posture of that name."""
+        """The posture of that name; UnknownNameError lists the valid ones."""
         return _named(self.postures, name, "posture")
 
     def frame(self, name: str) -> tuple[str, Pose]:
         """Link and zero pose of a frame: ``base``, a link or a tip.
+
+        Args:
+            name: of the frame.
+
+        Returns:
+            The link that it is fixed to, and its pose in base axes, translation in [m].
 
         Raises:
             UnknownNameError: no such frame.
@@ -238,12 +245,20 @@ class Robot(RobotRecord):
         raise UnknownNameError("frame", name, ("base", *self.tip_names, *self.link_names))
 
     def with_inertia_floor(self, mass: float = 1e-6, inertia: float = 1e-6) -> Robot:
-        """The robot with every link at least so heavy: what simulators need for massless brackets."""
+        """The robot with every link at least so heavy: what simulators need for massless brackets.
+
+        Args:
+            mass: least mass of a link [kg].
+            inertia: least moment of inertia about each base axis, through the link's CoM [kg m^2].
+        """
 
         def raised(link: Link) -> Link:
             i = link.inertia
-            floor = Inertia(max(i.xx, inertia), max(i.yy, inertia), max(i.zz, inertia), i.xy, i.xz, i.yz)
-            return replace(link, mass=max(link.mass, mass), inertia=floor)
+            raised = Inertia(max(i.xx, inertia), max(i.yy, inertia), max(i.zz, inertia), i.xy, i.xz, i.yz)
+            if not are_inertias([raised]):  # a sphere added keeps principal moments those of a body
+                more = max(0, inertia - min(i.xx, i.yy, i.zz))
+                raised = Inertia(i.xx + more, i.yy + more, i.zz + more, i.xy, i.xz, i.yz)
+            return replace(link, mass=max(link.mass, mass), inertia=raised)
 
         return replace(self, links=tuple(raised(link) for link in self.links))
 

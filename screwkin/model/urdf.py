@@ -51,6 +51,9 @@ def urdf_from_robot(robot: Robot) -> str:
     Simulators need masses above zero on every link: give them ``robot.with_inertia_floor()``. Tips, soles and
     postures have no place in URDF; a fixed base is the reader's choice.
 
+    Args:
+        robot: of numbers.
+
     Raises:
         InputError: the robot has helical joints or closures, which URDF cannot say; all are named.
     """

@@ -40,7 +40,10 @@ class UrdfRobot:
 
 
 def load_urdf(path: str | Path) -> UrdfRobot:
-    """The robot of a URDF file.
+    """The robot of a URDF file, with remarks on what a table cannot hold.
+
+    Args:
+        path: of the file.
 
     Raises:
         TableError: the file cannot be read or has faults; it lists all of them.
@@ -50,6 +53,10 @@ def load_urdf(path: str | Path) -> UrdfRobot:
 
 def parse_urdf(text: str, path: str = "<text>") -> UrdfRobot:
     """The robot of a URDF text; its base is fixed if the root link is called ``world``, else floating.
+
+    Args:
+        text: XML.
+        path: where it comes from, for messages and for ``Robot.path``.
 
     Raises:
         TableError: the text has faults; it lists all of them.

@@ -20,7 +20,7 @@ from screwkin.errors import InputError, TableError
 from screwkin.model.library import robot_names
 from screwkin.model.record_faults import check_records, record_faults, vars_of
 from screwkin.model.records import RobotRecord, same_content
-from screwkin.model.robot import Closure, Robot, robot_text
+from screwkin.model.robot import Closure, Inertia, Robot, robot_text
 from screwkin.model.sound import certified
 from screwkin.model.table import load_robot, parse_robot
 from tests.model.tables import MINI, changed, only_fault
@@ -234,3 +234,15 @@ def test_closures_are_refused_with_the_function_that_honours_them() -> None:
     assert isinstance(robot.closures[0], Closure)
     assert np.isfinite(sk.home(robot).q).all()
     assert MINI
+
+
+@given(st.integers(0, 2**31))
+@settings(max_examples=60, deadline=None)
+def test_a_floor_of_inertia_leaves_a_body(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    p = rng.normal(size=(3, 3)) * np.exp(rng.uniform(-8, -3, 3)) @ np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    J = 0.02 * sum(np.dot(x, x) * np.eye(3) - np.outer(x, x) for x in p - p.mean(axis=0))
+    inertia = Inertia(J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2])
+    light = replace(BIOLOID, links=(replace(BIOLOID.links[0], inertia=inertia), *BIOLOID.links[1:]))
+    raised = light.with_inertia_floor().links[0].inertia
+    assert min(raised.xx, raised.yy, raised.zz) >= 1e-6 * (1 - 1e-12)
