@@ -82,7 +82,8 @@ class Robot(RobotRecord):
         """The robot of the same table with other numbers; everything that depends on them follows.
 
         Formulas, mirrored rows, inertias by box, soles and postures are evaluated anew, and ``text`` is the
-        table of the new robot, with its comments where the values stand in rows of their own.
+        table of the new robot, with its comments where the values stand in rows of their own. It stands in no
+        file, so ``path`` is none.
 
         Args:
             masses: of links, by name [kg]; a mirrored link follows the one that it mirrors.
@@ -108,7 +109,7 @@ class Robot(RobotRecord):
         for what, wanted in wishes.items():
             expect(wanted, Mapping, what, "values by the name of their link or joint")
         text = changed_text(self, robot_text(self), name, parameters, wishes)
-        robot = self.from_text(text, self.path, self._is_symbolic)
+        robot = self.from_text(text, f"<{self.name}, changed>", self._is_symbolic)
         check_followed(robot, wishes)
         return robot
 

@@ -37,6 +37,7 @@ def test_a_longer_thigh_moves_everything_that_depends_on_it() -> None:
         assert link.inertia.xx == pytest.approx(link.mass * (0.04**2 + 0.09**2) / 12)
     state = sk.home(longer)
     assert sk.frame_pose(longer, state, "right_foot")[2, 3] == pytest.approx(0, abs=1e-12)
+    assert longer.path == "<bioloid, changed>"
     assert longer.text == BIOLOID.text.replace("thigh = 0.0773829 ", "thigh = 0.09 ")
     assert same_content(longer, parse_robot(longer.text))
 
