@@ -16,6 +16,7 @@ from typing import Literal
 import numpy as np
 
 from screwkin.algebra.arrays import Array
+from screwkin.algebra.pytrees import pytree
 from screwkin.algebra.se3 import NO_TWIST, as_array, pose_from_array, unstack
 from screwkin.compliance.deflection import frames
 from screwkin.compliance.equilibrium import SETTLED, Loaded, equilibrium, first_order
@@ -24,13 +25,14 @@ from screwkin.compliance.supported import Supported
 from screwkin.dynamics.newton_euler import GRAVITY
 from screwkin.errors import InputError, NoSolutionError, ShapeError, SingularError, UnknownNameError
 from screwkin.kinematics.positions import link_displacements
-from screwkin.model.robot import Robot
+from screwkin.model.robot import Robot, refuse_closures
 from screwkin.model.state import State
 
 Method = Literal["linear", "nonlinear"]
 
 
 @dataclass(frozen=True, eq=False)
+@pytree("frames", "method")
 class Deflection:
     """How a robot on one frame deflects under its weight; B stands for any leading dimensions.
 
@@ -191,12 +193,7 @@ def cartesian_stiffness(
 
 def _flat(robot: Robot, state: State) -> tuple[Array, Array, tuple[int, ...]]:
     """Base poses (B, 4, 4), positions (B, n) and the batch's shape of a checked state."""
-    if robot.closures:
-        names = ", ".join(closure.name for closure in robot.closures)
-        raise InputError(
-            f"{robot.name} has closures ({names}); deflections and compliances are computed for trees only, "
-            "and no function computes those of closed loops yet"
-        )
+    refuse_closures(robot, "deflections", "no function computes those of closed loops yet")
     T, q = np.asarray(state.T_world_base, dtype=float), np.asarray(state.q, dtype=float)
     n = len(robot.joints)
     if T.shape[-2:] != (4, 4) or q.shape[-1:] != (n,):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from screwkin.algebra.arrays import Array
+from screwkin.algebra.pytrees import pytree
 from screwkin.compiler.run import run
 from screwkin.dynamics.margin import support_margin
 from screwkin.dynamics.quantities import balance
@@ -17,6 +18,7 @@ from screwkin.trajectory import Trajectory, check_joints
 
 
 @dataclass(frozen=True, eq=False)
+@pytree("spikes")
 class Balance:
     """ZMP, its margin and the ground wrench, over T samples.
 

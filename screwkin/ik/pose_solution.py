@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from screwkin.algebra.arrays import Array
+from screwkin.algebra.pytrees import pytree
 from screwkin.errors import LimitError, SingularError, UnreachableError
 from screwkin.kinematics.status import Status
 from screwkin.model.robot import Joint, Robot
@@ -14,6 +15,7 @@ from screwkin.model.state import State
 
 
 @dataclass(frozen=True, eq=False)
+@pytree("limbs")
 class PoseSolution:
     """Positions of a batch, with a status for every limb.
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array
+from screwkin.algebra.pytrees import pytree
 from screwkin.algebra.scalar import is_jax
 from screwkin.errors import InputError
 from screwkin.kinematics.limits import TURN, turns
@@ -26,6 +27,7 @@ DIGITS = 6
 
 
 @dataclass(frozen=True, eq=False)
+@pytree("limb", "joint_names", "method", "chain")
 class LimbSolutions:
     """Joint positions that put a limb's tip at its targets; k branches, n joints, best branch first.
 
