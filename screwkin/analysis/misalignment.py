@@ -16,7 +16,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.screws import Screw
 from screwkin.algebra.se3 import Vector, as_array, cross, dot, norm, rotate, rotation_log
-from screwkin.analysis.chains import Chain, by_screws
+from screwkin.analysis.chains import ModelChain, by_screws
 from screwkin.model.dh import DHTable, dh_fk
 from screwkin.model.dh_derive import dh_from_screws
 
@@ -53,7 +53,7 @@ class Misalignment:
 
 
 def misalignment(
-    chains: Sequence[Chain], tilts: Sequence[float] = TILTS, seed: int = 0
+    chains: Sequence[ModelChain], tilts: Sequence[float] = TILTS, seed: int = 0
 ) -> Misalignment | None:
     """The series for the first two successive axes that are parallel and apart; None where there are none."""
     for chain in chains:
@@ -65,7 +65,9 @@ def misalignment(
     return None
 
 
-def _series(chain: Chain, tilted: int, normal: Vector, tilts: Sequence[float], seed: int) -> Misalignment:
+def _series(
+    chain: ModelChain, tilted: int, normal: Vector, tilts: Sequence[float], seed: int
+) -> Misalignment:
     screw = chain.screws[tilted]
     about = (normal + cross(screw.s, normal)) / math.sqrt(2.0)
     q = list(np.random.default_rng(seed).uniform(-math.pi, math.pi, (len(chain.screws), 100)))
@@ -85,7 +87,9 @@ def _series(chain: Chain, tilted: int, normal: Vector, tilts: Sequence[float], s
     return Misalignment(chain.name, names, np.array(tilts), *np.array(found).T)
 
 
-def sensitivity(chains: Sequence[Chain], length: float, draws: int = 20, seed: int = 0) -> dict[str, float]:
+def sensitivity(
+    chains: Sequence[ModelChain], length: float, draws: int = 20, seed: int = 0
+) -> dict[str, float]:
     """Largest change of a model's numbers per change of an axis, when all axes are slightly off at random.
 
     Axes tilt by 1e-6 rad and shift by 1e-6 of ``length``, the robot's size [m]; changes of lengths are told
