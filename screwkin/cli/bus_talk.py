@@ -18,8 +18,18 @@ from screwkin.model.table import load_robot
 from screwkin.servo.bus import Bus, open_line
 from screwkin.servo.calibrate import calibrated, turned, zeros
 from screwkin.servo.profiles import load_profile
+from screwkin.servo.protocols import codec
 from screwkin.servo.servo_map import ServoMap
-from screwkin.servo.survey import BAUDS, IDS, PROTOCOLS, Found, differences, measured_angles, readings, scan
+from screwkin.servo.survey import (
+    BAUDS,
+    IDS,
+    PROTOCOLS,
+    AnsweringServo,
+    measured_angles,
+    readings,
+    scan,
+    servo_differences,
+)
 
 Port = Annotated[str, typer.Option(help="Serial port of the servos, as /dev/ttyUSB0.")]
 Rs485 = Annotated[bool, typer.Option("--rs485", help="Let the kernel switch direction.")]
@@ -38,15 +48,15 @@ def bus_scan(
 ) -> int:
     """Who answers on a bus. With --robot every difference from its table is told, and the exit code is 3."""
     servos = ServoMap.of(load_robot(robot)) if robot else None
-    if protocol not in (0.0, *PROTOCOLS):
-        raise InputError(f"--protocol {protocol} is none of servos; give 1.0 or 2.0")
+    if protocol:
+        codec(protocol)  # refuses one that there is not
     if baud < 0 or last not in IDS:
         raise InputError(f"--baud {baud} and --last {last}: give a rate above 0, and an id up to {IDS[-1]}")
     own = servos is not None and not everything
     bauds = (baud,) if baud else (servos.baud,) if servos and own else BAUDS
     protocols = (protocol,) if protocol else (servos.protocol,) if servos and own else PROTOCOLS
     found = _scanned(port, bauds, protocols, last, rs485)
-    wrong = differences(found, servos) if servos else []
+    wrong = servo_differences(found, servos) if servos else []
     if as_json:
         rows = [
             {"id": f.id, "model": f.name, "number": f.model, "protocol": f.protocol, "baud": f.baud}
@@ -133,8 +143,8 @@ def _posture(robot: Robot, name: str) -> tuple[float, ...]:
 
 def _scanned(
     port: str, bauds: tuple[int, ...], protocols: tuple[float, ...], last: int, rs485: bool
-) -> list[Found]:
-    found: list[Found] = []
+) -> list[AnsweringServo]:
+    found: list[AnsweringServo] = []
     total, done = len(bauds) * len(protocols) * (last + 1), 0
     with progress_bar("scan") as share:
         for baud in bauds:

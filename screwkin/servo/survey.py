@@ -10,15 +10,16 @@ from screwkin.servo.budget import block_of
 from screwkin.servo.bus import Bus
 from screwkin.servo.line import BusError, DamagedError, LineLostError
 from screwkin.servo.profiles import Profile, load_profile, physical, profile_models
+from screwkin.servo.protocols import CODECS
 from screwkin.servo.servo_map import ServoMap
 
 IDS = range(253)
 BAUDS = (1_000_000, 57_600, 115_200, 500_000, 200_000, 250_000, 400_000, 19_200, 9_600, 2_000_000, 3_000_000)
-PROTOCOLS = (1.0, 2.0)
+PROTOCOLS = tuple(CODECS)
 
 
 @dataclass(frozen=True)
-class Found:
+class AnsweringServo:
     """A servo that answered: model is its number, -1 where only damaged packets came."""
 
     id: int
@@ -35,10 +36,10 @@ class Found:
 
 def scan(
     bus: Bus, ids: Iterable[int] = IDS, progress: Callable[[int], None] = lambda id: None
-) -> list[Found]:
+) -> list[AnsweringServo]:
     """Every servo that answers at the bus's rate and protocol.
 
-    Where two share an id their answers spoil each other; that is told as model -1.
+    Where two share an id their answers spoil each other; that is reported as model -1.
 
     Raises:
         LineLostError: the port is gone.
@@ -55,7 +56,7 @@ def scan(
             number = -1
         except BusError:
             continue
-        found.append(Found(id, number, bus.protocol, bus.baud))
+        found.append(AnsweringServo(id, number, bus.protocol, bus.baud))
     return found
 
 
@@ -67,12 +68,12 @@ def _spoiled(bus: Bus, id: int, number: int) -> None:
             bus.read(id, *block_of(profile)[:2])
 
 
-def differences(found: Sequence[Found], servos: ServoMap) -> list[str]:
+def servo_differences(found: Sequence[AnsweringServo], servos: ServoMap) -> list[str]:
     """How the servos found differ from the robot's table."""
     return list(_differences({servo.id: servo for servo in found}, servos))
 
 
-def _differences(found: dict[int, Found], servos: ServoMap) -> Iterator[str]:
+def _differences(found: dict[int, AnsweringServo], servos: ServoMap) -> Iterator[str]:
     for joint in servos.joints:
         who = f"{joint.joint} (servo {joint.id})"
         servo = found.get(joint.id)
@@ -128,5 +129,5 @@ def measured_angles(bus: Bus, servos: ServoMap) -> dict[str, float]:
             continue
         angles[joint.joint] = physical(joint.profile, "present_position", raw)
     if silent:
-        raise InputError(f"no answer from {', '.join(silent)}; screwkin bus scan tells who is there")
+        raise InputError(f"no answer from {', '.join(silent)}; screwkin bus scan lists those that do")
     return angles

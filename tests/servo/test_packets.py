@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from dynamixel_sdk.protocol2_packet_handler import Protocol2PacketHandler
 from hypothesis import given
 from hypothesis import strategies as st
 
+import screwkin
+from screwkin.errors import InputError
 from screwkin.servo import protocol1, protocol2
-from screwkin.servo.packets import Command, Packet
-from screwkin.servo.protocols import codec
+from screwkin.servo.packets import Packet, Request
+from screwkin.servo.profiles import load_profile
+from screwkin.servo.protocols import CODECS, codec
+from screwkin.servo.virtual.bus import SimulatedClock, VirtualBus
+from screwkin.servo.virtual.servo import VirtualServo
+
+PACKAGE = Path(screwkin.__file__).parent
 
 BOTH = pytest.mark.parametrize("protocol", [protocol1, protocol2], ids=["1.0", "2.0"])
 packets_of = st.builds(
@@ -172,8 +184,8 @@ def test_the_worst_streams_are_read_once_per_longest_packet(protocol, pattern, m
 
 def test_a_sync_write_concerns_those_it_names():
     packet = Packet(0xFE, 0x83, hexed("1E 04 00 10 00 50 01 01 20 02 60 03"))
-    assert protocol1.command_for(packet, 0) == Command("write", 30, data=hexed("10 00 50 01"), answers=False)
-    assert protocol1.command_for(packet, 1) == Command("write", 30, data=hexed("20 02 60 03"), answers=False)
+    assert protocol1.command_for(packet, 0) == Request("write", 30, data=hexed("10 00 50 01"), answers=False)
+    assert protocol1.command_for(packet, 1) == Request("write", 30, data=hexed("20 02 60 03"), answers=False)
     assert protocol1.command_for(packet, 2) is None
     torn = Packet(0xFE, 0x83, packet.params[:-1])
     assert protocol1.command_for(torn, 0) is None
@@ -181,14 +193,14 @@ def test_a_sync_write_concerns_those_it_names():
 
 def test_reads_of_many_are_answered_in_turn():
     bulk = Packet(0xFE, 0x92, hexed("00 02 01 1E 04 02 24"))
-    assert protocol1.command_for(bulk, 2) == Command("read", 0x24, 4, after=(1,))
+    assert protocol1.command_for(bulk, 2) == Request("read", 0x24, 4, after=(1,))
     sync = Packet(0xFE, 0x82, hexed("84 00 04 00 03 01 02"))
-    assert protocol2.command_for(sync, 2) == Command("read", 132, 4, after=(3, 1))
+    assert protocol2.command_for(sync, 2) == Request("read", 132, 4, after=(3, 1))
     bulk2 = Packet(0xFE, 0x92, hexed("01 90 00 02 00 02 92 00 01 00"))
-    assert protocol2.command_for(bulk2, 2) == Command("read", 146, 1, after=(1,))
+    assert protocol2.command_for(bulk2, 2) == Request("read", 146, 1, after=(1,))
     write = Packet(0xFE, 0x93, hexed("01 20 00 02 00 A0 00 02 1F 00 01 00 50"))
-    assert protocol2.command_for(write, 2) == Command("write", 31, data=b"\x50", answers=False)
-    assert protocol2.command_for(Packet(0xFE, 1), 4) == Command("ping", after=(0, 1, 2, 3))
+    assert protocol2.command_for(write, 2) == Request("write", 31, data=b"\x50", answers=False)
+    assert protocol2.command_for(Packet(0xFE, 1), 4) == Request("ping", after=(0, 1, 2, 3))
 
 
 @BOTH
@@ -201,9 +213,29 @@ def test_any_packet_can_be_asked_what_it_wants(protocol, packet):
 
 def test_a_broadcast_is_carried_out_and_not_answered():
     command = protocol1.command_for(Packet(0xFE, 3, hexed("18 01")), 5)
-    assert command == Command("write", 24, data=b"\x01", answers=False)
+    assert command == Request("write", 24, data=b"\x01", answers=False)
 
 
 def test_the_codec_is_that_of_the_protocol():
     assert codec(1.0).pack(Packet(1, 1)) == hexed("FF FF 01 02 01 FB")
     assert codec(2.0).pack(Packet(1, 1)) == hexed("FF FF FD 00 01 03 00 01 19 4E")
+
+
+def test_a_further_protocol_is_one_file_and_one_row(monkeypatch):
+    """Its servo answers on a virtual bus, and nothing else compares the numbers of protocols."""
+    further = SimpleNamespace(**{**vars(protocol1), "FACTS": replace(protocol1.FACTS, number=3.0)})
+    monkeypatch.setitem(CODECS, 3.0, further)
+    clock = SimulatedClock()
+    bus = VirtualBus([VirtualServo(replace(load_profile("AX-12A"), protocol=3.0), 7)], clock)
+    bus.write(further.pack(Packet(7, 1)))
+    clock.sleep(0.01)
+    assert further.parse(bus.read(64)) == ([Packet(7, 0)], b"")
+
+    assert all(number == file.FACTS.number for number, file in CODECS.items())
+    sources = [path for folder in ("servo", "cli") for path in (PACKAGE / folder).rglob("*.py")]
+    assert not [path for path in sources if re.search(r"protocol (==|!=) \d", path.read_text("utf-8"))]
+
+
+def test_a_protocol_that_there_is_not_is_refused():
+    with pytest.raises(InputError, match=r"invalid protocol 1\.5; expected 1\.0 or 2\.0"):
+        codec(1.5)

@@ -16,7 +16,7 @@ from typing import Protocol
 
 import numpy as np
 
-from screwkin.servo.packets import BROADCAST, Command, Packet
+from screwkin.servo.packets import BROADCAST, Packet, Request
 from screwkin.servo.protocols import Codec, codec
 from screwkin.servo.virtual.faults import Trouble, deafened, suffered
 from screwkin.servo.virtual.servo import VirtualServo
@@ -26,12 +26,12 @@ _BITS_PER_BYTE = 10
 _SAME_RATE = 0.03  # of the rate: what both ends of a line tolerate
 _SERVOS_OWN = ("reset", "overload", "overheat", "brown-out")
 
-Witness = Callable[[float, int, Command], None]
+Witness = Callable[[float, int, Request], None]
 """Called with time, servo id and command whenever a servo is told something."""
 
 
-class Clock(Protocol):
-    """A clock that never goes back."""
+class Now(Protocol):
+    """The part of a clock that a bus reads."""
 
     def now(self) -> float:
         """Time [s]."""
@@ -68,7 +68,7 @@ class VirtualBus:
     def __init__(
         self,
         servos: Sequence[VirtualServo],
-        clock: Clock,
+        clock: Now,
         baud: int = 1_000_000,
         troubles: Sequence[Trouble] = (),
         seed: int = 0,
@@ -170,7 +170,7 @@ class VirtualBus:
 
     def _obey(self, packet: Packet, time: float) -> float:
         """Let the servos concerned carry out a packet; returns when the line is free again."""
-        told: list[tuple[VirtualServo, Command]] = []
+        told: list[tuple[VirtualServo, Request]] = []
         tolerated = _SAME_RATE * self.baudrate
         for servo in self.servos:
             if packet.id not in (servo.id, BROADCAST) or abs(servo.baud - self.baudrate) > tolerated:
@@ -191,7 +191,7 @@ class VirtualBus:
                 said.add(id)
         return time
 
-    def _answer(self, servo: VirtualServo, command: Command, time: float) -> tuple[float, bytes] | None:
+    def _answer(self, servo: VirtualServo, command: Request, time: float) -> tuple[float, bytes] | None:
         """What a servo answers: its return delay, and the bytes."""
         id = servo.id  # the command may change it
         self._live_through(time)
