@@ -11,9 +11,9 @@ from typing import Annotated
 
 import typer
 
+from screwkin.cli.injected import Faults, FormerFaults, Seed, injected_faults
 from screwkin.cli.options import AsJson, RobotName
 from screwkin.cli.output import print_json, remark, silent
-from screwkin.cli.troubles import Seed, Troubles, troubles_of
 from screwkin.errors import InputError, OutputError
 from screwkin.model.table import load_robot
 from screwkin.servo.line import MonotonicClock
@@ -33,7 +33,8 @@ def virtual(
         float | None, typer.Option(help="Of every joint [N m/rad]; default: the table's, or rigid.")
     ] = None,
     return_delay: Annotated[float, typer.Option(help="From command to answer [microseconds].")] = 500.0,
-    trouble: Troubles = None,
+    inject_fault: Faults = None,
+    trouble: FormerFaults = None,
     seed: Seed = 0,
     seconds: Annotated[
         float | None, typer.Option(help="End after this time; default: when interrupted.")
@@ -48,7 +49,7 @@ def virtual(
     q = None if posture is None else table.posture(posture).q
     servos = virtual_servos(table, q, stiffness, 1e-6 * return_delay)
     start = clock.now()
-    bus = VirtualBus(servos, clock, mapped.baud, troubles_of(trouble, start), seed)
+    bus = VirtualBus(servos, clock, mapped.baud, injected_faults(inject_fault, trouble, start=start), seed)
     with PseudoTerminal(bus) as terminal, _linked(link, terminal.path) as port:
         told = {"port": port, "robot": table.name, "servos": len(servos), "protocol": mapped.protocol}
         if as_json:

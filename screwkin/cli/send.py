@@ -13,18 +13,18 @@ import typer
 
 from screwkin.analysis.readiness import Ready, ready
 from screwkin.cli.folder import output_folder
+from screwkin.cli.injected import Faults, FormerFaults, Seed, injected_faults
 from screwkin.cli.options import AsJson, OutputFolder, TrajectoryPath
 from screwkin.cli.output import print_json, progress_bar, remark
-from screwkin.cli.troubles import Seed, Troubles, troubles_of
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.model.robot import Robot
 from screwkin.servo.budget import ADAPTER, budget
 from screwkin.servo.bus import Bus, open_line
 from screwkin.servo.gate import Bounds
-from screwkin.servo.player import Frames, Outcome, Player, PlaySettings, State, describe, frames_of
+from screwkin.servo.player import Frames, Player, PlayOutcome, PlaySettings, State, describe, frames_of
 from screwkin.servo.servo_map import ServoMap
 from screwkin.servo.virtual.bus import SimulatedClock, VirtualBus
-from screwkin.servo.virtual.faults import Trouble
+from screwkin.servo.virtual.faults import InjectedFault
 from screwkin.servo.virtual.robot import virtual_servos
 
 _STATES: tuple[State, ...] = ("hold", "limp")
@@ -45,7 +45,8 @@ def send(
     on_fault: Annotated[str, typer.Option(help="After a fault: hold or limp.")] = "hold",
     at_end: Annotated[str, typer.Option(help="After the last frame: hold or limp.")] = "hold",
     rs485: Annotated[bool, typer.Option("--rs485", help="Let the kernel switch direction.")] = False,
-    trouble: Troubles = None,
+    inject_fault: Faults = None,
+    trouble: FormerFaults = None,
     seed: Seed = 0,
     output: OutputFolder = None,
     as_json: AsJson = False,
@@ -59,9 +60,9 @@ def send(
         raise InputError("--port and --virtual are two buses; give one of them")
     if go and not (port or virtual):
         raise InputError("--go needs a bus: --port /dev/ttyUSB0, or --virtual")
-    if trouble and not virtual:
-        raise InputError("--trouble is for virtual servos; give --virtual with it")
-    troubles = troubles_of(trouble)
+    faults = injected_faults(inject_fault, trouble)
+    if faults and not virtual:
+        raise InputError("--inject-fault is for virtual servos; add --virtual")
     may = ready(trajectory, robot or None)
     settings = PlaySettings(
         rate=rate, torque=torque, far=_distance(far), on_fault=_state(on_fault), at_end=_state(at_end)
@@ -84,12 +85,12 @@ def send(
         _tell_dry(trajectory, frames, bounds, facts, as_json)
         return 0
     with output_folder(output, "send", may.robot.name) as folder:
-        bus = _real_bus(servos, port, rs485) if port else virtual_bus(may.robot, troubles, seed)
+        bus = _real_bus(servos, port, rs485) if port else virtual_bus(may.robot, faults, seed)
         outcome = played(bus, may, settings, folder / "play.npz", {"port": port or "virtual"})
     return _tell(outcome, facts | {"log": str(folder / "play.npz")}, bounds, as_json)
 
 
-def played(bus: Bus, may: Ready, settings: PlaySettings, log: Path, told: Mapping[str, Any]) -> Outcome:
+def played(bus: Bus, may: Ready, settings: PlaySettings, log: Path, told: Mapping[str, Any]) -> PlayOutcome:
     """Play on a bus, close it, and save the log whatever happens once the servos move.
 
     Args:
@@ -121,11 +122,11 @@ def _real_bus(servos: ServoMap, port: str, rs485: bool) -> Bus:
     return Bus(open_line(port, servos.baud, rs485), servos.protocol, servos.baud)
 
 
-def virtual_bus(robot: Robot, troubles: Sequence[Trouble] = (), seed: int = 0) -> Bus:
+def virtual_bus(robot: Robot, faults: Sequence[InjectedFault] = (), seed: int = 0) -> Bus:
     """Virtual servos of the robot in its posture ``home``, or at zero, on a simulated clock."""
     servos, clock = ServoMap.of(robot), SimulatedClock()
     made = virtual_servos(robot, return_delay=_RETURN_DELAY)
-    line = VirtualBus(made, clock, servos.baud, troubles, seed, adapter=ADAPTER)
+    line = VirtualBus(made, clock, servos.baud, faults, seed, adapter=ADAPTER)
     return Bus(line, servos.protocol, servos.baud, clock)
 
 
@@ -160,7 +161,7 @@ def _tell_dry(path: Path, frames: Frames, bounds: Bounds, facts: dict[str, Any],
     )
 
 
-def _tell(outcome: Outcome, facts: dict[str, Any], bounds: Bounds, as_json: bool) -> int:
+def _tell(outcome: PlayOutcome, facts: dict[str, Any], bounds: Bounds, as_json: bool) -> int:
     told = describe(outcome, bounds.ids)
     if as_json:
         print_json({**outcome.to_dict(), **facts, "message": told})

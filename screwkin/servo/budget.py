@@ -15,7 +15,7 @@ _FARTHEST = 24  # bytes that are read along to have the torque registers in the 
 
 
 def block_of(profile: Profile) -> tuple[int, int, tuple[str, ...]]:
-    """Address and length of the bytes that are read of a servo in a play, and the registers in them."""
+    """Address and length of the bytes that are read from a servo in a play, and the registers in them."""
     names = [name for name in (*BLOCK, *HEALTH) if name in profile.registers]
     end = max(profile.register(name).end for name in names)
     names = [name for name in names if end - profile.register(name).address <= _FARTHEST]

@@ -194,28 +194,28 @@ class Bus:
     def read_many(
         self, ids: Sequence[int], address: int, length: int, grouped: Grouped = "none"
     ) -> dict[int, Reply]:
-        """Bytes at one address of several servos; those that gave no sound reply are left out.
+        """Bytes at one address of several servos; those without a sound reply are left out.
 
         Args:
             ids: of the servos.
             address: first byte of each servo's table.
             length: number of bytes.
-            grouped: ask all in one packet, where all of them know it (an AX-12 knows none); who does not
+            grouped: ask all in one packet, where all of them support it (an AX-12 does not); who does not
                 answer to it is asked alone.
 
         Raises:
             LineLostError: the port is gone.
         """
-        found = self._grouped(ids, address, length, grouped) if grouped != "none" and len(ids) > 1 else {}
+        replies = self._grouped(ids, address, length, grouped) if grouped != "none" and len(ids) > 1 else {}
         for id in ids:
-            if id not in found:
+            if id not in replies:
                 try:
-                    found[id] = self.read(id, address, length)
+                    replies[id] = self.read(id, address, length)
                 except LineLostError:
                     raise
                 except BusError:
                     continue
-        return {id: found[id] for id in ids if id in found}
+        return {id: replies[id] for id in ids if id in replies}
 
     def _grouped(self, ids: Sequence[int], address: int, length: int, grouped: Grouped) -> dict[int, Reply]:
         """The replies to one sync or bulk read, up to the first that is missing."""
@@ -225,7 +225,7 @@ class Bus:
         else:
             rows = [number for id in ids for number in (length, id, address)]
             self._send(lambda: self._handler.bulkReadTx(self._port, rows, len(rows)))
-        found: dict[int, Reply] = {}
+        replies: dict[int, Reply] = {}
         for id in ids:
             self.statistics.exchanges += 1
             began = self.clock.now()
@@ -235,8 +235,8 @@ class Bus:
                 self.statistics.failed += 1
                 break
             self.statistics.answered(self.clock.now() - began)
-            found[id] = Reply(id, bytes(data), self._codec.errors(int(error)))
-        return found
+            replies[id] = Reply(id, bytes(data), self._codec.errors(int(error)))
+        return replies
 
     def _ask(self, id: int, address: int, length: int) -> tuple[bytes, int, int]:
         result = self._handler.readTx(self._port, id, address, length)

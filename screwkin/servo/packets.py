@@ -27,7 +27,7 @@ Kind = Literal[
     "ping", "read", "write", "register", "action", "factory reset", "reboot", "unknown", "malformed"
 ]
 
-Outcome = Literal["done", "angle", "limit", "range", "access", "instruction"]
+RequestOutcome = Literal["done", "angle", "limit", "range", "access", "instruction"]
 """What became of a request: carried out, or why not."""
 
 
@@ -95,7 +95,7 @@ class Facts:
 class Request:
     """What one servo is asked: ``length`` bytes to read, ``data`` to write, at ``address``.
 
-    ``answers`` says whether an answer may be given at all, whatever the servo's status level; ``after`` names
+    ``answers`` says whether it may be answered at all, whatever the servo's status level; ``after`` names
     the servos whose answers come before its own.
     """
 
@@ -137,9 +137,9 @@ def sound_packets(
         if i + whole > len(data):
             if not ended:
                 return packets, data[i:]
-        elif whole and (found := opened(data[i : i + whole])):
-            packets.append(found[0])
-            end = i + found[1]
+        elif whole and (sound := opened(data[i : i + whole])):
+            packets.append(sound[0])
+            end = i + sound[1]
     begun = (header[:n] for n in range(len(header) - 1, 0, -1) if data.endswith(header[:n], end))
     return packets, b"" if ended else next(begun, b"")
 

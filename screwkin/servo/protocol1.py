@@ -21,9 +21,9 @@ from screwkin.servo.packets import (
     BROADCAST,
     Facts,
     Instruction,
-    Outcome,
     Packet,
     Request,
+    RequestOutcome,
     ids_before,
     rows,
     simple_command,
@@ -60,7 +60,7 @@ _BITS: tuple[ErrorBit, ...] = (
     "overload",
     "instruction",
 )  # bits 0 to 6 of the error byte
-_OUTCOMES: Mapping[Outcome, int] = {
+_OUTCOMES: Mapping[RequestOutcome, int] = {
     "done": 0,
     "angle": 0x02,
     "limit": 0x08,
@@ -91,7 +91,7 @@ def errors(byte: int) -> frozenset[ErrorBit]:
     return frozenset(name for bit, name in enumerate(_BITS) if byte >> bit & 1)
 
 
-def error_byte(outcome: Outcome, alarms: int) -> int:
+def error_byte(outcome: RequestOutcome, alarms: int) -> int:
     """The error byte of an answer: what became of the request, and the bits of the servo's alarms."""
     return alarms | _OUTCOMES[outcome]
 
@@ -116,7 +116,7 @@ def _opened(data: bytes) -> tuple[Packet, int] | None:
     """The packet, if its sum is right, and the bytes it uses up."""
     if data[-1] != checksum(data[2:-1]):
         return None
-    # A sum of FF may be the next header's: it always is where one bit made len greater by one.
+    # A sum of FF may be the next header's: it always is where one wrong bit raises len by one.
     return Packet(data[2], data[4], data[5:-1]), len(data) - (data[-1] == 0xFF)
 
 

@@ -24,9 +24,9 @@ from screwkin.servo.packets import (
     BROADCAST,
     Facts,
     Instruction,
-    Outcome,
     Packet,
     Request,
+    RequestOutcome,
     ids_before,
     rows,
     simple_command,
@@ -69,7 +69,7 @@ _NUMBERS: Mapping[int, ErrorBit] = {
     6: "range",
     7: "access",
 }
-_OUTCOMES: Mapping[Outcome, int] = {
+_OUTCOMES: Mapping[RequestOutcome, int] = {
     "done": 0,
     "angle": 6,
     "limit": 6,
@@ -116,7 +116,7 @@ def errors(byte: int) -> frozenset[ErrorBit]:
     return names | {"hardware"} if byte & _ALERT else names
 
 
-def error_byte(outcome: Outcome, alarms: int) -> int:
+def error_byte(outcome: RequestOutcome, alarms: int) -> int:
     """The error byte of an answer: what became of the request, and whether the servo has an alarm."""
     return (_ALERT if alarms else 0) | _OUTCOMES[outcome]
 

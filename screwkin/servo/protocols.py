@@ -8,7 +8,7 @@ from typing import Protocol
 from screwkin.errors import InputError
 from screwkin.servo import protocol1, protocol2
 from screwkin.servo.line import ErrorBit
-from screwkin.servo.packets import Facts, Outcome, Packet, Request
+from screwkin.servo.packets import Facts, Packet, Request, RequestOutcome
 
 
 class Codec(Protocol):
@@ -33,7 +33,7 @@ class Codec(Protocol):
     def errors(self, byte: int) -> frozenset[ErrorBit]:
         """What an answer's error byte says."""
 
-    def error_byte(self, outcome: Outcome, alarms: int) -> int:
+    def error_byte(self, outcome: RequestOutcome, alarms: int) -> int:
         """The error byte of an answer."""
 
 

@@ -44,7 +44,7 @@ def scan(
     Raises:
         LineLostError: the port is gone.
     """
-    found = []
+    answering = []
     for id in ids:
         progress(id)
         try:
@@ -56,8 +56,8 @@ def scan(
             number = -1
         except BusError:
             continue
-        found.append(AnsweringServo(id, number, bus.protocol, bus.baud))
-    return found
+        answering.append(AnsweringServo(id, number, bus.protocol, bus.baud))
+    return answering
 
 
 def _spoiled(bus: Bus, id: int, number: int) -> None:
@@ -68,15 +68,15 @@ def _spoiled(bus: Bus, id: int, number: int) -> None:
             bus.read(id, *block_of(profile)[:2])
 
 
-def servo_differences(found: Sequence[AnsweringServo], servos: ServoMap) -> list[str]:
-    """How the servos found differ from the robot's table."""
-    return list(_differences({servo.id: servo for servo in found}, servos))
+def servo_differences(answering: Sequence[AnsweringServo], servos: ServoMap) -> list[str]:
+    """How the servos that answer differ from the robot's table."""
+    return list(_differences({servo.id: servo for servo in answering}, servos))
 
 
-def _differences(found: dict[int, AnsweringServo], servos: ServoMap) -> Iterator[str]:
+def _differences(answering: dict[int, AnsweringServo], servos: ServoMap) -> Iterator[str]:
     for joint in servos.joints:
         who = f"{joint.joint} (servo {joint.id})"
-        servo = found.get(joint.id)
+        servo = answering.get(joint.id)
         if servo is None:
             yield f"{who} is missing"
             continue
@@ -88,7 +88,7 @@ def _differences(found: dict[int, AnsweringServo], servos: ServoMap) -> Iterator
             yield f"{who} speaks protocol {servo.protocol}, the table has {servos.protocol}"
         if servo.baud != servos.baud:
             yield f"{who} is set to {servo.baud} baud, the table has {servos.baud}"
-    for id, servo in sorted(found.items()):
+    for id, servo in sorted(answering.items()):
         if id not in servos.ids:
             yield f"servo {id} ({servo.name}) belongs to no joint of {servos.robot}"
 

@@ -9,8 +9,16 @@ from __future__ import annotations
 
 import math
 
-from screwkin.servo.packets import Outcome, Request
-from screwkin.servo.profiles import Profile, Register, baud_from_register, decode, encode, register_from_baud
+from screwkin.servo.packets import Request, RequestOutcome
+from screwkin.servo.profiles import (
+    Profile,
+    Register,
+    baud_from_register,
+    decode,
+    encode,
+    radians_from_ticks,
+    register_from_baud,
+)
 from screwkin.servo.protocols import codec
 from screwkin.servo.virtual.body import OVERHEAT, OVERLOAD, VOLTAGE, Body
 
@@ -104,7 +112,7 @@ class VirtualServo:
             return
         profile, goal = self.profile, None
         if self.torque_on:
-            goal = (self.get("goal_position") - profile.centre) * profile.tick
+            goal = radians_from_ticks(profile, self.get("goal_position"))
         wanted, most = self.get("moving_speed"), profile.no_load_speed * self.body.voltage / profile.voltage
         speed = min(wanted * profile.speed_unit, most) if wanted else most
         limit = self.profile.register("torque_limit")
@@ -116,12 +124,12 @@ class VirtualServo:
             self._alarms |= cause  # a shutdown lasts until torque is switched on again
             self.put("torque_enable", 0)
 
-    def reset(self, time: float, keep: int | None = None) -> None:
-        """Start anew at a time: the table above ``keep`` forgets (default: what power does not keep)."""
+    def reset(self, time: float, begin: int | None = None) -> None:
+        """Start anew at a time, with registers from address ``begin`` on as new (default: volatile ones)."""
         self.advance(time)
-        begin = self.profile.ram_begins if keep is None else keep
+        first = self.profile.ram_begins if begin is None else begin
         for register in self.profile.registers.values():
-            if register.address >= begin:
+            if register.address >= first:
                 self._put(register, register.initial)
         self._registered, self._alarms, self.body.overloaded = None, 0, 0.0
         self._hold_still()
@@ -137,7 +145,7 @@ class VirtualServo:
             return None
         return self._codec.error_byte(outcome, self.alarms), data
 
-    def _carry_out(self, command: Request, time: float) -> tuple[Outcome, bytes]:
+    def _carry_out(self, command: Request, time: float) -> tuple[RequestOutcome, bytes]:
         match command.kind:
             case "ping":
                 return "done", self._who() if self._facts.ping_names_model else b""
@@ -165,20 +173,20 @@ class VirtualServo:
     def _who(self) -> bytes:
         return self.get("model_number").to_bytes(2, "little") + bytes((self.get("firmware"),))
 
-    def _read(self, address: int, length: int) -> tuple[Outcome, bytes]:
+    def _read(self, address: int, length: int) -> tuple[RequestOutcome, bytes]:
         if not 0 < length <= len(self.table) - address:
             return "range", b""
         self._refresh()
         return "done", bytes(self.table[address : address + length])
 
-    def _register(self, address: int, data: bytes) -> Outcome:
+    def _register(self, address: int, data: bytes) -> RequestOutcome:
         outcome = self._check(address, data)
         if outcome == "done":
             self._registered = (address, data)
             self.put("registered", 1)
         return outcome
 
-    def _write(self, address: int, data: bytes) -> Outcome:
+    def _write(self, address: int, data: bytes) -> RequestOutcome:
         """Write all of the data or, where any of it is refused, nothing."""
         outcome = self._check(address, data)
         if outcome != "done":
@@ -194,7 +202,7 @@ class VirtualServo:
                 self._hold_still()
         return "done"
 
-    def _check(self, address: int, data: bytes) -> Outcome:
+    def _check(self, address: int, data: bytes) -> RequestOutcome:
         if address + len(data) > len(self.table):
             return "range"
         after = bytearray(self.table)
@@ -208,7 +216,7 @@ class VirtualServo:
                 return outcome
         return "done"
 
-    def _check_one(self, register: Register, value: int) -> Outcome:
+    def _check_one(self, register: Register, value: int) -> RequestOutcome:
         lasting = register.address < self.profile.ram_begins
         locked = lasting and self.torque_on and self._facts.locked_while_stiff
         if register.access == "r" or locked:
