@@ -152,7 +152,13 @@ def _of(chain: ModelChain, q: Array) -> list[Array]:
 def differences(
     chains: Sequence[ModelChain], models: Mapping[str, Sequence[DHTable]], q: Array
 ) -> tuple[float, float]:
-    """Largest difference of tip poses and of Jacobians between the models."""
+    """Largest difference of an entry of tip poses and of Jacobians between the models [1 and m].
+
+    Args:
+        chains: of the robot.
+        models: the DH tables of a walk by standing leg, from ``support_models``.
+        q: (samples, n) positions of all joints [rad or m].
+    """
     fk, jacobian, tips = 0.0, 0.0, dict[str, Pose]()
     for chain in chains:
         tip, columns = by_screws(chain.screws, chain.frame, _of(chain, q))
@@ -227,10 +233,10 @@ def _conditions(robot: Robot, chains: Sequence[ModelChain], length: float) -> di
     home = next(
         (posture.q for posture in robot.postures if posture.name == "home"), (0.0,) * len(robot.joints)
     )
-    found = {}
+    condition = {}
     for chain in chains:
         tip, columns = by_screws(chain.screws, chain.frame, [home[i] for i in chain.joints])
         J = as_array([at(tip.p, column) for column in columns]).T / np.array([[1]] * 3 + [[length]] * 3)
         sigma = np.linalg.svd(J, compute_uv=False)
-        found[chain.name] = float(sigma[0] / sigma[-1]) if sigma[-1] > 1e-12 * sigma[0] else math.inf
-    return found
+        condition[chain.name] = float(sigma[0] / sigma[-1]) if sigma[-1] > 1e-12 * sigma[0] else math.inf
+    return condition

@@ -27,11 +27,11 @@ def replay(trajectory: Path, log: Path, wish: Wish, output: Path | None, as_json
 
     Writes replay.json, pictures and report.html into the folder ``replay`` beside the log; the verdict that
     ``send`` asks for is not touched. The motors of the simulation enforce what was measured, so their torque
-    is told, but not judged.
+    is reported, but not judged.
     """
-    loaded, told = load_trajectory(trajectory), load_log(log)
+    loaded, played = load_trajectory(trajectory), load_log(log)
     robot = recorded_robot(loaded, str(trajectory))
-    planned, motion = replayed(robot, loaded, told)
+    planned, motion = replayed(robot, loaded, played)
     account = account_of(robot, planned)
     away = float(np.degrees(np.abs(motion.q - planned.q).max()))
     facts = {
@@ -48,7 +48,7 @@ def replay(trajectory: Path, log: Path, wish: Wish, output: Path | None, as_json
             commands=[line for line in commands if line],
             motion=motion,
             criteria=Criteria(torque_share=np.inf),
-            more=lambda check: save_servo_pictures(account, folder, told) if wish.plots else (),
+            more=lambda check: save_servo_pictures(account, folder, played) if wish.plots else (),
         )
         check = simulate(account, folder, folder / VERDICT, wish)
     if planned.samples < loaded.samples:
@@ -58,11 +58,11 @@ def replay(trajectory: Path, log: Path, wish: Wish, output: Path | None, as_json
     if as_json:
         print_json({"robot": robot.name, **facts, **check.to_dict()})
     else:
-        _tell(check, facts, folder)
+        _print(check, facts, folder)
     return 0 if check.passed else 3
 
 
-def _tell(check: Validation, facts: dict[str, object], folder: Path) -> None:
+def _print(check: Validation, facts: dict[str, object], folder: Path) -> None:
     print(
         f"{facts['log']}: joints as measured, {facts['replayed_s']:.2f} s in {check.engine}; up to "
         f"{facts['max_deviation_deg']:.1f} deg from the plan"

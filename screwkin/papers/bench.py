@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 from screwkin.analysis.account import Account, account_of
 from screwkin.analysis.compare import Comparison, compare_models
-from screwkin.analysis.engines import Yielding
+from screwkin.analysis.engines import SimulatedCompliance
 from screwkin.analysis.facts import Facts, facts_of
 from screwkin.analysis.validate import Validation, validate
 from screwkin.gait.files import load_gait
@@ -68,9 +68,9 @@ class Bench:
 
     def validation(self, account: Account, sole_stiffness: float | None = None) -> Validation:
         """The verdict of the simulator on a walk, with rigid soles or elastic ones [N/m]."""
-        trajectory, gives = account.trajectory, Yielding(sole_stiffness=sole_stiffness)
+        trajectory, compliance = account.trajectory, SimulatedCompliance(sole_stiffness=sole_stiffness)
         key = ("validation", trajectory.sha256, sole_stiffness)
-        return self.once(key, lambda: validate(account.robot, trajectory, gives=gives))
+        return self.once(key, lambda: validate(account.robot, trajectory, compliance=compliance))
 
     def comparison(self, robot: str = "") -> Comparison:
         """Screws against DH tables."""

@@ -80,7 +80,7 @@ def test_a_pulled_cable_ends_it(cli):
         (["--posture", "yoga"], "unknown posture 'yoga'; valid: zero, home"),
         (["--return-delay", "-1"], "servos have 0 to 0.000508 s"),
         (["--stiffness", "0"], "must be a positive number"),
-        (["--link", "/proc/none/here"], "cannot be made"),
+        (["--link", "/proc/none/here"], "cannot be created"),
     ],
 )
 def test_wrong_words_are_refused_before_a_port_is_opened(cli, words, part):
