@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from types import MappingProxyType
@@ -22,6 +22,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, rotation_exp, rotation_from_array, rotation_log
 from screwkin.errors import InputError, TrajectoryError
 from screwkin.files import atomic_write, atomic_write_bytes, npz_bytes, read_npz
+from screwkin.model.robot import Robot
 from screwkin.model.state import not_rigid
 
 TIP_PREFIX = "T_world_"
@@ -174,6 +175,29 @@ def load_trajectory(path: str | Path) -> Trajectory:
         raise TrajectoryError(f"{path}: {error}") from None
     object.__setattr__(trajectory, "_file_sha256", hashlib.sha256(data).hexdigest())
     return trajectory
+
+
+def check_joints(robot: Robot, joint_names: Sequence[str], what: str = "the trajectory") -> None:
+    """Refuse joints that are not all of a robot's, in the order of its table.
+
+    Args:
+        robot: the robot that is to move.
+        joint_names: of what moves it.
+        what: what that is, for the message.
+
+    Raises:
+        InputError: a joint is missing or foreign, or the order is another.
+    """
+    if tuple(joint_names) == robot.joint_names:
+        return
+    missing = [name for name in robot.joint_names if name not in joint_names]
+    foreign = [name for name in joint_names if name not in robot.joint_names]
+    faults = [f"it lacks {', '.join(missing)}"] if missing else []
+    faults += [f"it has the foreign {', '.join(foreign)}"] if foreign else []
+    reason = " and ".join(faults) or "they stand in another order"
+    raise InputError(
+        f"{what}'s joints are not those of {robot.name}: {reason}; give the robot that it was planned for"
+    )
 
 
 def sha256_of(path: str | Path) -> str:
