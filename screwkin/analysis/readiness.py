@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.errors import SafetyError, UnknownNameError
+from screwkin.errors import InputError, SafetyError, UnknownNameError
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
-from screwkin.trajectory import Trajectory, load_trajectory, sha256_of
+from screwkin.trajectory import Trajectory, check_joints, load_trajectory, sha256_of
 
 VERDICT = "validation.json"
 _ROUNDING = 1e-9  # a posture may lie on a limit, up to rounding
@@ -141,8 +141,10 @@ def _same_robot(path: Path, trajectory: Trajectory, robot: str | Path | None) ->
             f"since (SHA-256 {_sha(table)[:12]}… then, {_sha(now.text)[:12]}… now). "
             "Plan it again, or name the table it was planned for: --robot FILE.toml"
         )
-    if trajectory.joint_names != now.joint_names:
-        raise SafetyError(f"{path} does not move the joints of {now.name} in the order of its table")
+    try:
+        check_joints(now, trajectory.joint_names, str(path))
+    except InputError as error:
+        raise SafetyError(str(error)) from error
     return now
 
 

@@ -11,7 +11,7 @@ from screwkin.errors import InputError
 from screwkin.model.robot import Robot
 from screwkin.servo.log import PlayLog
 from screwkin.servo.servo_map import ServoMap
-from screwkin.trajectory import Trajectory
+from screwkin.trajectory import Trajectory, check_joints
 
 _FEWEST = 6  # readings of a joint: a cubic with some to spare
 _LAGS = np.arange(0.0, 0.2, 0.001)  # s
@@ -49,11 +49,9 @@ def replayed(robot: Robot, trajectory: Trajectory, log: PlayLog) -> tuple[Trajec
 
 def _check_same(robot: Robot, trajectory: Trajectory, log: PlayLog) -> None:
     played, name = log.meta.get("trajectory_sha256"), log.meta.get("robot")
-    if name != robot.name or log.joint_names != robot.joint_names:
-        raise InputError(
-            f"the log is of robot {name} with joints {', '.join(log.joint_names)}; the trajectory moves "
-            f"{robot.name} with {', '.join(robot.joint_names)}"
-        )
+    if name != robot.name:
+        raise InputError(f"the log is of robot {name}; the trajectory moves {robot.name}")
+    check_joints(robot, log.joint_names, "the log")
     if played != trajectory.sha256:
         raise InputError(
             f"the log is of another trajectory: it was played from one with SHA-256 {str(played)[:12]}…, "

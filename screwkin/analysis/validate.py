@@ -21,7 +21,7 @@ from screwkin.sim.compliant import CompliantBackend
 from screwkin.sim.measure import WINDOW, Slip, ZmpRecord, slip, speed_use, torque_use, zmp_record
 from screwkin.sim.render import pictures
 from screwkin.sim.run import Run, Schedule, simulate
-from screwkin.trajectory import Trajectory
+from screwkin.trajectory import Trajectory, check_joints
 
 _SERIES = ("run", "zmp", "pictures")
 
@@ -154,11 +154,7 @@ def film(robot: Robot, trajectory: Trajectory, run: Run, camera: Camera) -> tupl
 
 
 def _check_fit(robot: Robot, trajectory: Trajectory) -> None:
-    if trajectory.joint_names != robot.joint_names:
-        raise InputError(
-            f"the trajectory moves the joints {', '.join(trajectory.joint_names)}, but robot {robot.name} "
-            f"has {', '.join(robot.joint_names)}; expected the robot it was planned for"
-        )
+    check_joints(robot, trajectory.joint_names)
     legs = [limb.tip for limb in robot.limbs if limb.kind == "leg"]
     missing = [foot for foot in legs if foot not in trajectory.feet]
     if missing:

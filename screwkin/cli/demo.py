@@ -15,7 +15,7 @@ from screwkin.analysis.validate import Validation
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder
 from screwkin.cli.output import aligned, print_json, remark, silent
-from screwkin.cli.simulation import Wish, simulate
+from screwkin.cli.simulation import Wish, simulate_to_files
 from screwkin.cli.virtual_play import played_to_virtual
 from screwkin.cli.walk import chosen_gait, command_of, make_trajectory, write_report
 from screwkin.errors import MissingDependencyError
@@ -87,7 +87,7 @@ def demo(
         ]
         wish = Wish(video=True, commands=commands, more=servos)
         try:
-            check = simulate(account, folder, folder / "validation.json", wish)
+            check = simulate_to_files(account, folder, folder / "validation.json", wish)
         except MissingDependencyError:
             page = write_report(account, folder)
             remark(f"The report stops before the simulation: {page}")

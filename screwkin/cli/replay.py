@@ -13,7 +13,7 @@ from screwkin.analysis.replay import replayed
 from screwkin.analysis.validate import Criteria, Validation
 from screwkin.cli.folder import output_folder
 from screwkin.cli.output import aligned, print_json, remark
-from screwkin.cli.simulation import Wish, print_verdict, simulate
+from screwkin.cli.simulation import Wish, print_verdict, simulate_to_files
 from screwkin.report.numbers import validation_numbers
 from screwkin.report.pictures import save_servo_pictures
 from screwkin.servo.log import load_log
@@ -50,7 +50,7 @@ def replay(trajectory: Path, log: Path, wish: Wish, output: Path | None, as_json
             criteria=Criteria(torque_share=np.inf),
             more=lambda check: save_servo_pictures(account, folder, played) if wish.plots else (),
         )
-        check = simulate(account, folder, folder / VERDICT, wish)
+        check = simulate_to_files(account, folder, folder / VERDICT, wish)
     if planned.samples < loaded.samples:
         remark(
             f"warning: the log ends at {planned.duration:.2f} of {loaded.duration:.2f} s: judged up to there"

@@ -44,7 +44,7 @@ class Wish:
     more: Callable[[Validation], Sequence[Saved]] = lambda check: ()
 
 
-def simulate(account: Account, folder: Path, verdict: Path, wish: Wish) -> Validation:
+def simulate_to_files(account: Account, folder: Path, verdict: Path, wish: Wish) -> Validation:
     """Simulate a trajectory, write the verdict, then film, pictures and report.
 
     Args:

@@ -15,7 +15,7 @@ from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, TrajectoryPath
 from screwkin.cli.output import aligned, print_json
 from screwkin.cli.replay import replay
-from screwkin.cli.simulation import Wish, print_verdict, simulate
+from screwkin.cli.simulation import Wish, print_verdict, simulate_to_files
 from screwkin.cli.simulation import engine as engine_named
 from screwkin.errors import InputError, OutputError
 from screwkin.files import make_folder
@@ -85,7 +85,7 @@ def validate(
     commands = _commands(str(loaded.meta.get("command", "")), words)
     wish = Wish(engine, gui, video, plots, commands, compliance)
     with output_folder(output or beside, "validate", account.robot.name) as folder:
-        check = simulate(account, folder, beside / "validation.json", wish)
+        check = simulate_to_files(account, folder, beside / "validation.json", wish)
     if as_json:
         print_json({"robot": account.robot.name, **check.to_dict()})
     else:

@@ -58,7 +58,7 @@ class Packet:
 
 
 @dataclass(frozen=True)
-class Facts:
+class ProtocolFacts:
     """What distinguishes a protocol besides the bytes of its packets.
 
     Attributes:

@@ -19,9 +19,9 @@ from collections.abc import Mapping
 from screwkin.servo.line import ErrorBit
 from screwkin.servo.packets import (
     BROADCAST,
-    Facts,
     Instruction,
     Packet,
+    ProtocolFacts,
     Request,
     RequestOutcome,
     ids_before,
@@ -31,7 +31,7 @@ from screwkin.servo.packets import (
     sync_write_command,
 )
 
-FACTS = Facts(
+FACTS = ProtocolFacts(
     number=1.0,
     id_at=2,
     length_at=3,

@@ -22,9 +22,9 @@ from collections.abc import Mapping
 from screwkin.servo.line import ErrorBit
 from screwkin.servo.packets import (
     BROADCAST,
-    Facts,
     Instruction,
     Packet,
+    ProtocolFacts,
     Request,
     RequestOutcome,
     ids_before,
@@ -37,7 +37,7 @@ from screwkin.servo.packets import (
 MOST = 1024
 """Bytes that ``len`` may count: servos have no room for more, so a greater length is noise."""
 
-FACTS = Facts(
+FACTS = ProtocolFacts(
     number=2.0,
     id_at=4,
     length_at=5,

@@ -8,14 +8,14 @@ from typing import Protocol
 from screwkin.errors import InputError
 from screwkin.servo import protocol1, protocol2
 from screwkin.servo.line import ErrorBit
-from screwkin.servo.packets import Facts, Packet, Request, RequestOutcome
+from screwkin.servo.packets import Packet, ProtocolFacts, Request, RequestOutcome
 
 
 class Codec(Protocol):
     """What a protocol's file holds."""
 
     @property
-    def FACTS(self) -> Facts:
+    def FACTS(self) -> ProtocolFacts:
         """Sizes, places, and how its servos behave."""
 
     def pack(self, packet: Packet) -> bytes:
