@@ -15,7 +15,7 @@ from screwkin.mechanism.least_values import least_values
 from screwkin.mechanism.mechanism import WAIST, Mechanism
 from screwkin.mechanism.network import blend
 from screwkin.mechanism.rates import secondary_accelerations, secondary_rates
-from screwkin.mechanism.tip_motion import motion, solvable_limbs
+from screwkin.mechanism.tip_motion import motion_program, solvable_limbs
 from screwkin.mechanism.virtual_motion import primary_motion
 
 
@@ -66,7 +66,7 @@ def joint_motion(
             for name in limbs:
                 tip, whole = robot.limb(name).tip, len(robot.path_to(robot.limb(name).link)) == 6
                 inputs[identifier(kind, tip)] = as_array(moved[tip] if whole else moved[tip].v, (count,))
-        found = run(motion.program(robot, True, limbs), inputs)
+        found = run(motion_program(robot, True, limbs), inputs)
         qd[:, own], qdd[:, own] = found["qd"], found["qdd"]
     return JointMotion(qd, qdd, least_values(mechanism, T_world_base, q))
 

@@ -16,9 +16,8 @@ from screwkin.compiler.records import identifier, pose_input
 from screwkin.compiler.run import common_batch, run
 from screwkin.kinematics.positions import frame_pose, joint_screws, link_displacements
 from screwkin.mechanism.chains import chain_twists
-from screwkin.mechanism.davies import mechanism_of
 from screwkin.mechanism.limb_motion import seen_from
-from screwkin.mechanism.mechanism import Mechanism
+from screwkin.mechanism.mechanism import Mechanism, mechanism_of
 from screwkin.mechanism.network import coupling_twists
 from screwkin.mechanism.rates import block_rows, network_of
 from screwkin.mechanism.scaling import (

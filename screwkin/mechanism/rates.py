@@ -18,12 +18,12 @@ from screwkin.algebra.arrays import Array, numpy_of
 from screwkin.algebra.scalar import is_jax
 from screwkin.algebra.se3 import as_array, twist_from_array, unstack
 from screwkin.compiler.run import common_batch, run
-from screwkin.mechanism import davies
 from screwkin.mechanism.choice import RANK_TOLERANCE
 from screwkin.mechanism.mechanism import Mechanism
-from screwkin.mechanism.network import assembled, twist_rates
+from screwkin.mechanism.network import assembled, coupling_screws, twist_rates
 from screwkin.mechanism.scaling import reference_points, referenced
 from screwkin.mechanism.secondary import formula_blocks, secondary_program
+from screwkin.model.state import State
 
 CERTIFIED = 2 * RANK_TOLERANCE
 """Lower bound of a block's least singular value above which its formula is certified.
@@ -135,9 +135,7 @@ def secondary_accelerations(
 
 def screws_of(mechanism: Mechanism, T_world_base: Array, q: Array) -> Array:
     """Screws of all couplings (..., 6, couplings), at the base origin, world axes."""
-    choice = mechanism.robot, mechanism.primary, mechanism.secondary
-    screws: Array = davies.coupling_screws(*choice, True, told={"T_world_base": T_world_base, "q": q})["S"]
-    return screws
+    return coupling_screws(mechanism, State(T_world_base, q))
 
 
 def network_of(mechanism: Mechanism, T_world_base: Array, q: Array) -> Array:

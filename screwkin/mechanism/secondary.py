@@ -15,9 +15,8 @@ from screwkin.compiler.program import Program, Recorder, kept
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.kinematics.serial_chain import SerialChain
-from screwkin.mechanism.davies import mechanism_of
 from screwkin.mechanism.limb_rates import Split, pose_rates, split_of
-from screwkin.mechanism.mechanism import Mechanism, VirtualChain
+from screwkin.mechanism.mechanism import Mechanism, VirtualChain, mechanism_of
 from screwkin.mechanism.network import coupling_twists
 from screwkin.mechanism.scaling import centre, characteristic_length, levers, reference_couplings
 from screwkin.model.robot import Robot
