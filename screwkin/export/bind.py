@@ -8,16 +8,17 @@ from __future__ import annotations
 import math
 from collections import namedtuple
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 
 from screwkin.algebra.arrays import Array
+from screwkin.compiler import run
 from screwkin.compiler.program import Program, Recorder
 from screwkin.compiler.records import identifier
-from screwkin.compiler.run import machine_code, run_rows
 from screwkin.errors import InputError
-from screwkin.export.quantities import QUANTITIES, choices_of, quantity_of, subject_of
+from screwkin.export.quantities import ALGORITHMS, QUANTITIES, choices_of, quantity_of, subject_of
 from screwkin.kinematics.arrays import Argument
 from screwkin.kinematics.door import Door
 from screwkin.kinematics.formula import Definition, Given
@@ -67,8 +68,9 @@ def prepare(robot: Robot, *quantities: Choice) -> None:
 
     Args:
         robot: n joints.
-        quantities: as for ``bind``; default: all. Of a frame or limb without a choice: all tips or limbs.
-            Arguments with a default are prepared both ways, all left out and all given.
+        quantities: as for ``bind``, and ``limb_ik``, ``solve_pose``, ``secondary_rates``; default: all that the
+            robot has. Of a frame or limb without a choice: all tips or limbs. Arguments with a default are
+            prepared both ways, all left out and all given.
 
     Example:
         >>> import screwkin as sk
@@ -77,14 +79,21 @@ def prepare(robot: Robot, *quantities: Choice) -> None:
         >>> sk.frame_pose(robot, sk.home(robot), "right_foot").shape
         (4, 4)
     """
-    for choice in quantities or tuple(QUANTITIES):
+    for choice in quantities:
         name, *words = (choice,) if isinstance(choice, str) else choice
+        if name in ALGORITHMS:
+            for program in ALGORITHMS[name](robot):
+                run.prepare(program)
+            continue
         quantity = quantity_of(name)
         every = [tuple(words)] if words else choices_of(robot, quantity)
         for optional in {(), quantity.definition.arrays_by_default}:
             for chosen in every:
                 subject, definition, given, choices, _ = _named(robot, (name, *chosen), optional)
                 definition.door(subject, given, choices).prepare()
+    for name in () if quantities else (*QUANTITIES, *ALGORITHMS):
+        with suppress(InputError):  # a robot without limbs or masses has fewer
+            prepare(robot, name)
 
 
 Part = tuple[Any, Definition, tuple[Given, ...], tuple[Any, ...], str]
@@ -161,13 +170,13 @@ class Bound:
         inputs, outputs = door.arguments, door.program.outputs
         rows = [x.reshape(-1, math.prod(a.shape)) for a, x in zip(inputs, values, strict=True)]
         filled = [x.reshape(-1, g.size) for g, x in zip(outputs, results, strict=True)]
-        native = machine_code(door.program)
+        native = run.machine_code(door.program)
         if native is not None:
             call: Callable[[], object] = native.bound(rows, filled)
         else:
 
             def call() -> object:
-                for to, row in zip(filled, run_rows(door.program, rows, len(filled[0])), strict=True):
+                for to, row in zip(filled, run.run_rows(door.program, rows, len(filled[0])), strict=True):
                     to[...] = row
                 return None
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from screwkin.compiler.program import Program
 from screwkin.dynamics.quantities import balance, ground_wrench, inverse_dynamics, mass_matrix, momentum
 from screwkin.errors import UnknownNameError
+from screwkin.ik.programs import limb_programs
 from screwkin.kinematics.body import (
     center_of_mass,
     com_jacobian,
@@ -17,9 +18,11 @@ from screwkin.kinematics.body import (
     tip_poses,
 )
 from screwkin.kinematics.formula import Quantity
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.choice import closed_mechanism
 from screwkin.mechanism.network import coupling_screws
 from screwkin.mechanism.quantities import network_matrix, virtual_motion
+from screwkin.mechanism.secondary import secondary_program
 from screwkin.mechanism.tip_motion import joint_rates
 from screwkin.model.robot import Robot
 
@@ -45,6 +48,22 @@ QUANTITIES: Mapping[str, Quantity] = {
     )
 }
 """Every quantity that a formula defines. A new one needs its definition and its row here."""
+
+
+def _limbs(robot: Robot) -> list[Program]:
+    return [p for limb in robot.limbs for p in limb_programs(SerialChain.of(robot, limb.name))]
+
+
+def _rates(robot: Robot) -> list[Program]:
+    return [secondary_program(robot, *closed_mechanism(robot).choice)]
+
+
+ALGORITHMS: Mapping[str, Callable[[Robot], list[Program]]] = {
+    "limb_ik": _limbs,
+    "solve_pose": _limbs,
+    "secondary_rates": _rates,
+}
+"""Functions that are more than a formula, and the programs in them: these can be prepared too."""
 
 
 def quantity_of(name: str) -> Quantity:
