@@ -78,8 +78,8 @@ def joint_motion(
             for name in limbs:
                 tip, whole = robot.limb(name).tip, len(robot.path_to(robot.limb(name).link)) == 6
                 inputs[identifier(kind, tip)] = as_array(moved[tip] if whole else moved[tip].v, (count,))
-        found = run(motion.program(robot, True, limbs), inputs)
-        qd[:, own], qdd[:, own] = found["qd"], found["qdd"]
+        result = run(motion.program(robot, True, limbs), inputs)
+        qd[:, own], qdd[:, own] = result["qd"], result["qdd"]
     return JointMotion(qd, qdd, least_values(mechanism, T_world_base, q))
 
 

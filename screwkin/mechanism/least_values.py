@@ -49,9 +49,9 @@ def least_values(mechanism: Mechanism, T_world_base: Array, q: Array) -> Array:
     others = [k for k in range(len(mechanism.blocks)) if k not in by_formula]
     if by_formula:
         program = block_values(mechanism.robot, mechanism.primary, mechanism.secondary)
-        found = run(program, {"T_world_base": T, "q": q})
-        least[:, by_formula] = found["least"]
-        doubtful = np.flatnonzero(~(found["error"] <= TRUSTED).all(axis=1))
+        result = run(program, {"T_world_base": T, "q": q})
+        least[:, by_formula] = result["least"]
+        doubtful = np.flatnonzero(~(result["error"] <= TRUSTED).all(axis=1))
         if len(doubtful):
             N = network_of(mechanism, T[doubtful], q[doubtful])
             least[doubtful[:, None], by_formula] = network_values(mechanism, N, by_formula)

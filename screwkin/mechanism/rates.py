@@ -57,7 +57,7 @@ def block_rows(circuits: Sequence[int]) -> list[int]:
 
 
 def flat(array: Array, axes: int, batch: tuple[int, ...]) -> Array:
-    """The array with its last axes kept and the batch, to which it broadcasts, as one axis in front."""
+    """The array broadcast to a batch, all of it as one axis in front of its last axes."""
     inner = array.shape[array.ndim - axes :]
     return np.broadcast_to(array, (*batch, *inner)).reshape(math.prod(batch), *inner)
 
@@ -95,9 +95,9 @@ def secondary_rates(mechanism: Mechanism, T_world_base: Array, q: Array, primary
 
     others = [k for k in range(len(mechanism.blocks)) if k not in by_formula]
     program = secondary_program(mechanism.robot, mechanism.primary, mechanism.secondary)
-    found = run(program, {"T_world_base": T, "q": q, "primary": primary})
-    values[:, [i for k in by_formula for i in mechanism.blocks[k][1]]] = found["secondary"]
-    doubtful = np.flatnonzero(~(found["least"] > CERTIFIED).all(axis=-1))
+    result = run(program, {"T_world_base": T, "q": q, "primary": primary})
+    values[:, [i for k in by_formula for i in mechanism.blocks[k][1]]] = result["secondary"]
+    doubtful = np.flatnonzero(~(result["least"] > CERTIFIED).all(axis=-1))
     if len(doubtful):
         solve(doubtful, by_formula)
     if others and len(q):
