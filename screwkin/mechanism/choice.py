@@ -156,10 +156,10 @@ def _check_closed(robot: Robot, q: Sequence[float]) -> None:
 
 def _check(mechanism: Mechanism, N: Array) -> None:
     names, needed = mechanism.couplings, len(mechanism.couplings) - mechanism.mobility
-    kept = independent(N, mechanism.secondary_columns)
-    surplus = [names[i] for i in mechanism.secondary_columns if i not in kept]
-    completed = independent(N, [*kept, *preference(mechanism)])
-    missing = [names[i] for i in completed if i not in kept]
+    basis = independent(N, mechanism.secondary_columns)
+    surplus = [names[i] for i in mechanism.secondary_columns if i not in basis]
+    completed = independent(N, [*basis, *preference(mechanism)])
+    missing = [names[i] for i in completed if i not in basis]
     have = len(mechanism.secondary)
     if have > needed:
         raise InputError(
@@ -178,7 +178,7 @@ def _check(mechanism: Mechanism, N: Array) -> None:
         )
     if surplus:
         raise SingularError(
-            f"the secondary couplings are dependent (rank {len(kept)} of {needed}): make primary "
+            f"the secondary couplings are dependent (rank {len(basis)} of {needed}): make primary "
             f"{', '.join(surplus)}, whose motion the other secondary couplings already contain, and make "
             f"secondary {', '.join(missing)}, which nothing else can follow"
         )

@@ -69,7 +69,7 @@ def coordinates_from_state(mechanism: Mechanism, T: Pose, q: Sequence[Scalar]) -
 
 
 def base_pose(mechanism: Mechanism, coordinates: Sequence[Scalar], fixed: Pose) -> Pose:
-    """Pose of the base told by the waist's chain, or the fixed one."""
+    """Pose of the base at the end of the waist's chain, or the fixed one."""
     for chain in mechanism.chains:
         if chain.limb is None:
             return chain_pose(chain.couplings, [coordinates[mechanism.position[n]] for n in chain.names])
@@ -173,7 +173,7 @@ def nearest_closed(robot: Robot, q: Array) -> Array:
     """Joint positions (n,) near q at which every closure of a table closes: for a posture written by eye.
 
     Raises:
-        NoSolutionError: none is found from there; the message tells the gap that is left.
+        NoSolutionError: Newton's method finds none from there; the message names the residual.
     """
     single = replace(robot, limbs=(), soles=())
     chains = virtual_chains(single)

@@ -11,6 +11,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import Twist, as_array, pose_from_array, unstack
 from screwkin.compiler.records import identifier
 from screwkin.compiler.run import run
+from screwkin.errors import InputError
 from screwkin.mechanism.least_values import least_values
 from screwkin.mechanism.mechanism import WAIST, Mechanism
 from screwkin.mechanism.network import blend
@@ -51,12 +52,23 @@ def joint_motion(
     Returns:
         JointMotion; blocks whose ``sigma`` is below ``RANK_TOLERANCE`` are singular, their values mean
         nothing.
+
+    Raises:
+        InputError: a joint in ``joints`` is not primary.
     """
     robot, count, given = mechanism.robot, len(q), joints or {}
+    for name in given:
+        if name not in mechanism.primary or name not in robot.joint_names:
+            raise InputError(f"{name} is no primary joint; its rate cannot be imposed")
     limbs = _limbs(mechanism)
-    qd, qdd = np.zeros((2, count, len(robot.joints)))
     own = sorted(i for name in limbs for i in robot.path_to(robot.limb(name).link))
-    if len(own) < len(robot.joints):
+    solved = {robot.joint_names[i] for i in own}
+    if solved | set(mechanism.primary) >= set(robot.joint_names):
+        qd, qdd = np.zeros((2, count, len(robot.joints)))
+        for name, (rate, acceleration) in given.items():
+            qd[:, robot.joint_names.index(name)] = rate
+            qdd[:, robot.joint_names.index(name)] = acceleration
+    else:
         qd, qdd = _by_couplings(mechanism, T_world_base, q, twists, accelerations, given)
     if own:
         inputs = {"T_world_base": T_world_base, "q": q}
@@ -66,8 +78,8 @@ def joint_motion(
             for name in limbs:
                 tip, whole = robot.limb(name).tip, len(robot.path_to(robot.limb(name).link)) == 6
                 inputs[identifier(kind, tip)] = as_array(moved[tip] if whole else moved[tip].v, (count,))
-        found = run(motion_program(robot, True, limbs), inputs)
-        qd[:, own], qdd[:, own] = found["qd"], found["qdd"]
+        result = run(motion_program(robot, True, limbs), inputs)
+        qd[:, own], qdd[:, own] = result["qd"], result["qdd"]
     return JointMotion(qd, qdd, least_values(mechanism, T_world_base, q))
 
 

@@ -19,11 +19,9 @@ from screwkin.mechanism.chains import chain_twists
 from screwkin.mechanism.limb_motion import seen_from
 from screwkin.mechanism.mechanism import Mechanism, mechanism_of
 from screwkin.mechanism.network import coupling_twists
-from screwkin.mechanism.rates import block_rows, network_of
+from screwkin.mechanism.rates import block_rows, flat, network_of
 from screwkin.mechanism.scaling import (
-    centre,
     characteristic_length,
-    reference_couplings,
     referenced,
     weighed,
 )
@@ -44,35 +42,48 @@ def least_values(mechanism: Mechanism, T_world_base: Array, q: Array) -> Array:
         ``characteristic_length``: a number without unit.
     """
     batch = common_batch((T_world_base, q), (2, 1))
-    T = np.broadcast_to(T_world_base, (*batch, 4, 4)).reshape(-1, 4, 4)
-    q = np.broadcast_to(q, (*batch, q.shape[-1])).reshape(-1, q.shape[-1])
+    T, q = flat(T_world_base, 2, batch), flat(q, 1, batch)
     least = np.empty((len(q), len(mechanism.blocks)))
-    by_formula = formula_blocks(mechanism)
-    doubtful = np.arange(len(q))
+    by_formula = _certifiable(mechanism)
+    others = [k for k in range(len(mechanism.blocks)) if k not in by_formula]
     if by_formula:
         program = block_values(mechanism.robot, mechanism.primary, mechanism.secondary)
-        found = run(program, {"T_world_base": T, "q": q})
-        least[:, by_formula] = found["least"]
-        if len(by_formula) == len(mechanism.blocks):
-            doubtful = np.flatnonzero(~(found["error"] <= TRUSTED).all(axis=1))
-    if len(doubtful):
-        least[doubtful] = network_values(mechanism, network_of(mechanism, T[doubtful], q[doubtful]))
+        result = run(program, {"T_world_base": T, "q": q})
+        least[:, by_formula] = result["least"]
+        doubtful = np.flatnonzero(~(result["error"] <= TRUSTED).all(axis=1))
+        if len(doubtful):
+            N = network_of(mechanism, T[doubtful], q[doubtful])
+            least[doubtful[:, None], by_formula] = network_values(mechanism, N, by_formula)
+    if others and len(q):
+        least[:, others] = network_values(mechanism, network_of(mechanism, T, q), others)
     return least.reshape(*batch, least.shape[-1])
 
 
-def network_values(mechanism: Mechanism, N: Array) -> Array:
-    """The same (..., blocks) of network matrices (..., 6 circuits, couplings) formed at the base origin."""
-    least, columns = np.empty((*N.shape[:-2], len(mechanism.blocks))), mechanism.secondary_columns
+def network_values(mechanism: Mechanism, N: Array, blocks: Sequence[int] | None = None) -> Array:
+    """The same of network matrices formed at the base origin.
+
+    Args:
+        mechanism: the closed mechanism.
+        N: (..., 6 circuits, couplings).
+        blocks: indices of blocks; default: all.
+    """
+    chosen = mechanism.blocks if blocks is None else [mechanism.blocks[k] for k in blocks]
+    least, columns = np.empty((*N.shape[:-2], len(chosen))), mechanism.secondary_columns
     scaled = referenced(mechanism, N)
-    for k, (circuits, own) in enumerate(mechanism.blocks):
+    for k, (circuits, own) in enumerate(chosen):
         A = scaled[..., block_rows(circuits), :][..., [columns[i] for i in own]]
         least[..., k] = np.linalg.svd(A, compute_uv=False)[..., -1]
     return least
 
 
+def _certifiable(mechanism: Mechanism) -> list[int]:
+    """Indices of the blocks that the program covers: of six couplings, with a tip for reference point."""
+    return [k for k in formula_blocks(mechanism) if tip_of(mechanism, mechanism.blocks[k][0][0]) is not None]
+
+
 @kept
 def block_values(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, ...]) -> Program:
-    """Least singular value of each of ``formula_blocks`` and its error, a program of ``T_world_base q``.
+    """Least singular value of each certifiable block and its error, as a program of ``T_world_base q``.
 
     Args:
         robot: the robot.
@@ -87,7 +98,7 @@ def block_values(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, .
     )
     R, q = pose_input(recorder, "T_world_base").R, recorder.input("q", len(robot.joints))
     values: list[tuple[Scalar, Scalar]] = []
-    for k in formula_blocks(mechanism):
+    for k in _certifiable(mechanism):
         (circuit,), own = mechanism.blocks[k]
         columns = [mechanism.secondary_columns[i] for i in own]
         signs = dict(zip(mechanism.couplings, mechanism.circuit_matrix[circuit].tolist(), strict=True))
@@ -104,21 +115,18 @@ def _at_reference(
     mechanism: Mechanism, circuit: int, names: Sequence[str], R: Rotation, q: Sequence[Scalar]
 ) -> dict[str, Twist]:
     """Screws of some couplings of a circuit at its reference point, in whatever axes they are simplest."""
-    chosen = reference_couplings(mechanism, mechanism.circuit_matrix[circuit].tolist())
-    tip = tip_of(mechanism, [mechanism.couplings[c] for c in chosen])
-    if tip is not None and tip.limb is not None:
-        path = mechanism.robot.path_to(tip.limb.link)
-        if [mechanism.robot.joint_names[i] for i in path] == list(names):
-            screws = [mechanism.robot.joints[i].screw for i in path]
-            return dict(zip(names, _limb_at_tip(screws, [q[i] for i in path], tip.limb.frame.p), strict=True))
+    tip, robot = tip_of(mechanism, circuit), mechanism.robot
+    assert tip is not None
+    assert tip.limb is not None
+    path = robot.path_to(tip.limb.link)
+    if [robot.joint_names[i] for i in path] == list(names):
+        screws = [robot.joints[i].screw for i in path]
+        return dict(zip(names, _limb_at_tip(screws, [q[i] for i in path], tip.limb.frame.p), strict=True))
     twists = dict(zip(mechanism.couplings, coupling_twists(mechanism, R, q), strict=True))
-    if tip is None:
-        point = centre([twists[mechanism.couplings[c]] for c in chosen])
-        return {name: at(point, twist) for name, twist in twists.items()}
-    D = link_displacements(mechanism.robot, q, Displacement(R, ZERO, ZERO))
-    body, held = frame_pose(mechanism.robot, D, tip.name), mechanism.held(tip, Pose(R, ZERO))
+    D = link_displacements(robot, q, Displacement(R, ZERO, ZERO))
+    body, held = frame_pose(robot, D, tip.name), mechanism.held(tip, Pose(R, ZERO))
     here = {name: at(body.p, twist) for name, twist in twists.items()}
-    joints = zip(mechanism.robot.joint_names, joint_screws(mechanism.robot, D), strict=True)
+    joints = zip(robot.joint_names, joint_screws(robot, D), strict=True)
     here |= {name: _twist(screw, body.p) for name, screw in joints}
     return here | dict(zip(tip.names, chain_twists(tip.couplings, body.R @ held.R.T, ZERO), strict=True))
 

@@ -73,7 +73,7 @@ class LimbMotion:
         return point_rates(self.twists, wanted.v, self.length)
 
     def _here(self, tip: Twist) -> Vector:
-        """Velocity at the point of a body that moves with a twist told at the tip."""
+        """Velocity at the point of a body that moves with a twist given at the tip."""
         return tip.v + cross(tip.omega, self.point - self.tip.p)
 
     def rates(self, base: Twist, tip: Twist) -> tuple[list[Scalar], Scalar]:

@@ -1,7 +1,7 @@
-"""Joint rates of one limb from the motion of its tip, by reciprocal screws where the geometry gives them.
+"""Joint rates of one limb from the motion of its tip, by reciprocal screws where the geometry allows.
 
 Three axes of a limb that meet in a point do no work on forces through it; three parallel ones none on
-moments across them nor on a force along them. Told so, the other three joints are one system of three
+moments across them nor on a force along them. So expressed, the other three joints are one system of three
 equations and the three themselves another: two Cramer's rules instead of an elimination with pivots, and
 formulas on any scalar. A limb without such axes is solved by orthogonal columns, without pivots either.
 
@@ -56,9 +56,9 @@ def pose_rates(
     """Rates of six joints whose screws add up to the wanted twist.
 
     Args:
-        twists: the joints' screws, told at the split's point (or any point near the limb), any axes.
+        twists: the joints' screws, expressed at the split's point (or any point near the limb), any axes.
         split: of the limb, from ``split_of``.
-        wanted: twist of the tip relative to the base, told likewise.
+        wanted: twist of the tip relative to the base, expressed likewise.
         length: of the limb [m]: it weighs velocities against angular ones.
 
     Returns:
@@ -86,12 +86,12 @@ def pose_rates(
     for i, rate in zip(others, rates, strict=True):
         wanted = wanted - twists[i] * rate
     own, second = cramer([inner(twists[i]) for i in three], inner(wanted))
-    found = dict(zip([*others, *three], [*rates, *own], strict=True))
-    return [found[i] for i in range(6)], times(first, second)
+    rate_of = dict(zip([*others, *three], [*rates, *own], strict=True))
+    return [rate_of[i] for i in range(6)], times(first, second)
 
 
 def point_rates(twists: Sequence[Twist], wanted: Vector, length: float) -> tuple[list[Scalar], Scalar]:
-    """Rates of three joints, their screws told at a point, that move it as wanted; and their determinant."""
+    """Rates of three joints, screws expressed at a point, that move it as wanted; and their determinant."""
     return cramer([t.v / length for t in twists], wanted / length)
 
 

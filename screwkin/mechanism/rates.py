@@ -9,6 +9,7 @@ Source: paper A, eq. 10-11.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -55,6 +56,12 @@ def block_rows(circuits: Sequence[int]) -> list[int]:
     return [6 * c + r for c in circuits for r in range(6)]
 
 
+def flat(array: Array, axes: int, batch: tuple[int, ...]) -> Array:
+    """The array broadcast to a batch, all of it as one axis in front of its last axes."""
+    inner = array.shape[array.ndim - axes :]
+    return np.broadcast_to(array, (*batch, *inner)).reshape(math.prod(batch), *inner)
+
+
 def secondary_rates(mechanism: Mechanism, T_world_base: Array, q: Array, primary: Array) -> SecondarySolution:
     """Rates of the secondary couplings from those of the primary ones: eq. 11.
 
@@ -68,15 +75,13 @@ def secondary_rates(mechanism: Mechanism, T_world_base: Array, q: Array, primary
         Singular blocks are solved by least squares, and marked.
     """
     batch = common_batch((T_world_base, q, primary), (2, 1, 1))
-    if any(map(is_jax, (T_world_base, q, primary))):
+    by_formula = formula_blocks(mechanism)
+    if not by_formula or any(map(is_jax, (T_world_base, q, primary))):
         xp = numpy_of(T_world_base, q, primary)
         N = network_of(mechanism, T_world_base, q)
         N = xp.broadcast_to(N, (*batch, *N.shape[-2:]))
         return _by_singular_values(mechanism, N, xp.broadcast_to(primary, (*batch, primary.shape[-1])))
-    T, q, primary = (
-        np.broadcast_to(a, (*batch, *a.shape[a.ndim - k :])).reshape(-1, *a.shape[a.ndim - k :])
-        for a, k in ((T_world_base, 2), (q, 1), (primary, 1))
-    )
+    T, q, primary = flat(T_world_base, 2, batch), flat(q, 1, batch), flat(primary, 1, batch)
     values = np.zeros((len(q), len(mechanism.secondary)))
     singular = np.zeros((len(q), len(mechanism.blocks)), dtype=bool)
 
@@ -88,15 +93,13 @@ def secondary_rates(mechanism: Mechanism, T_world_base: Array, q: Array, primary
             values[samples[:, None], own] = solution.values[:, own]
             singular[samples, k] = solution.singular[:, k]
 
-    by_formula = formula_blocks(mechanism)
     others = [k for k in range(len(mechanism.blocks)) if k not in by_formula]
-    if by_formula:
-        program = secondary_program(mechanism.robot, mechanism.primary, mechanism.secondary)
-        found = run(program, {"T_world_base": T, "q": q, "primary": primary})
-        values[:, [i for k in by_formula for i in mechanism.blocks[k][1]]] = found["secondary"]
-        doubtful = np.flatnonzero(~(found["least"] > CERTIFIED).all(axis=-1))
-        if len(doubtful):
-            solve(doubtful, by_formula)
+    program = secondary_program(mechanism.robot, mechanism.primary, mechanism.secondary)
+    result = run(program, {"T_world_base": T, "q": q, "primary": primary})
+    values[:, [i for k in by_formula for i in mechanism.blocks[k][1]]] = result["secondary"]
+    doubtful = np.flatnonzero(~(result["least"] > CERTIFIED).all(axis=-1))
+    if len(doubtful):
+        solve(doubtful, by_formula)
     if others and len(q):
         solve(np.arange(len(q)), others)
     return SecondarySolution(
@@ -178,17 +181,28 @@ def _by_singular_values(
 
 def _solve(A: Array, b: Array) -> tuple[Array, Array]:
     """x (..., n) with A x = b, by least squares where A is singular or not square; where it is singular."""
-    xp = numpy_of(A, b)
-    singular = xp.linalg.svd(A, compute_uv=False)[..., -1] < RANK_TOLERANCE
-    if A.shape[-1] != A.shape[-2]:
-        return (xp.linalg.pinv(A, rcond=RANK_TOLERANCE) @ b)[..., 0], singular
-    here, eye = singular[..., None, None], xp.broadcast_to(xp.eye(A.shape[-1]), A.shape)
-    x = xp.linalg.solve(xp.where(here, eye, A), b)
-    if is_jax(A):
-        from jax.lax import stop_gradient
+    xp, square = numpy_of(A, b), A.shape[-1] == A.shape[-2]
+    if square or is_jax(A):
+        singular = xp.linalg.svd(A, compute_uv=False)[..., -1] < RANK_TOLERANCE
+        if not square:
+            return (xp.linalg.pinv(A, rcond=RANK_TOLERANCE) @ b)[..., 0], singular
+        here, eye = singular[..., None, None], xp.broadcast_to(xp.eye(A.shape[-1]), A.shape)
+        x = xp.linalg.solve(xp.where(here, eye, A), b)
+        if is_jax(A):
+            from jax.lax import stop_gradient
 
-        least = xp.linalg.pinv(stop_gradient(xp.where(here, A, eye)), rcond=RANK_TOLERANCE) @ b
-        x = xp.where(here, least, x)
-    elif singular.any():
-        x[singular] = np.linalg.pinv(A[singular], rcond=RANK_TOLERANCE) @ b[singular]
-    return x[..., 0], singular
+            least = xp.linalg.pinv(stop_gradient(xp.where(here, A, eye)), rcond=RANK_TOLERANCE) @ b
+            x = xp.where(here, least, x)
+        elif singular.any():
+            x[singular] = _least_squares(A[singular], b[singular])[0]
+        return x[..., 0], singular
+    x, sigma = _least_squares(A, b)
+    return x[..., 0], sigma[..., -1] < RANK_TOLERANCE
+
+
+def _least_squares(A: Array, b: Array) -> tuple[Array, Array]:
+    """The shortest x (..., n, 1) of least squares, and the singular values of A."""
+    U, sigma, V = np.linalg.svd(A, full_matrices=False)
+    regular = sigma > RANK_TOLERANCE * sigma[..., :1]
+    scale = np.where(regular, 1 / np.where(regular, sigma, 1.0), 0.0)
+    return V.swapaxes(-1, -2) @ (scale[..., None] * (U.swapaxes(-1, -2) @ b)), sigma

@@ -9,17 +9,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
+import numpy as np
+
 from screwkin.algebra.arrays import Array, numpy_of
-from screwkin.algebra.linear import cramer
 from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.screws import Screw
-from screwkin.algebra.se3 import ZERO, Twist, Vector, X, Y, Z, as_array, cross, dot, norm, vector_from_array
+from screwkin.algebra.se3 import Twist, Vector, as_array, dot, norm
 from screwkin.compiler.program import kept
 from screwkin.mechanism.mechanism import WAIST, Mechanism
 from screwkin.model.robot import Robot
 
 _FREE = 1e-9
 """Weight that settles a reference point along a direction that all axes share, where it does not matter."""
+
+_CROSS = np.cross(np.eye(3)[:, None], np.eye(3)[None]).transpose(2, 0, 1)
+"""a x b has the components a _CROSS[i] b; a contracted with it is the matrix of w x a, for any w."""
 
 
 def skeleton(screws: Sequence[Screw], tip: Vector) -> list[Vector]:
@@ -72,39 +76,33 @@ def characteristic_length(robot: Robot) -> float:
 
 
 def _radius(screws: Sequence[Screw]) -> float:
-    lines = [screw for screw in screws if not screw.is_translation]
+    lines = [Screw(screw.s, screw.s0).twist for screw in screws if not screw.is_translation]
     if not lines:
         return 0.0
-    p = centre([Screw(line.s, line.s0).twist for line in lines])
-    return max(float(norm(cross(line.s, p - line.s0))) for line in lines)
+    S = as_array(lines).T
+    apart = S[3:] + np.cross(S[:3], centre(S)[:, None], axis=0)
+    return float(np.linalg.norm(apart, axis=0).max())
 
 
-def centre(twists: Sequence[Twist]) -> Vector:
-    """The point nearest to the axes of some screws: the sum of the squared distances is least [m].
+def centre(S: Array) -> Array:
+    """The point (..., 3) nearest to the axes of some screws: the sum of the squared distances is least [m].
 
     Where all axes are parallel any point along them would do. A small weight settles it, and refinement takes
     the weight out of the other directions again.
 
     Args:
-        twists: normalised screws at one origin, at least one; those without rotation have no line.
+        S: normalised screws (..., 6, count) at one origin; those without rotation have no line.
     """
-    columns = [e * (_FREE * len(twists)) + _apart(twists, e) for e in (X, Y, Z)]
-    wanted = ZERO
-    for twist in twists:
-        wanted = wanted + cross(twist.omega, twist.v)
-    p = Vector(*cramer(columns, wanted)[0])
+    xp, omega = numpy_of(S), S[..., :3, :]
+    eye = np.eye(3).reshape(*(1 for _ in S.shape[:-2]), 3, 3)
+    W = (omega * omega).sum(axis=(-2, -1))[..., None, None] * eye - omega @ omega.swapaxes(-1, -2)
+    products = omega @ S[..., 3:, :].swapaxes(-1, -2)
+    wanted = xp.tensordot(products, _CROSS, ((-2, -1), (1, 2)))[..., None]
+    inverse = xp.linalg.inv(W + _FREE * eye)
+    p = inverse @ wanted
     for _ in range(2):
-        p = p + Vector(*cramer(columns, wanted - _apart(twists, p))[0])
-    return p
-
-
-def _apart(twists: Sequence[Twist], p: Vector) -> Vector:
-    """Sum of what points from every screw's axis, moved through the origin, to a point."""
-    total = ZERO
-    for twist in twists:
-        w = twist.omega
-        total = total + p * dot(w, w) - w * dot(w, p)
-    return total
+        p = p + inverse @ (wanted - W @ p)
+    return p[..., 0]
 
 
 def reference_couplings(mechanism: Mechanism, circuit: Sequence[int]) -> list[int]:
@@ -124,18 +122,23 @@ def reference_couplings(mechanism: Mechanism, circuit: Sequence[int]) -> list[in
     return turning if len(turning) > 1 else moving
 
 
+@kept
+def _reference_mask(mechanism: Mechanism) -> Array:
+    """(circuits, 1, couplings) of 1.0 for ``reference_couplings``, else 0.0."""
+    mask = np.zeros((len(mechanism.circuits), 1, len(mechanism.couplings)))
+    for row, circuit in zip(mask, mechanism.circuit_matrix.tolist(), strict=True):
+        row[0, reference_couplings(mechanism, circuit)] = 1.0
+    return mask
+
+
 def reference_points(mechanism: Mechanism, N: Array) -> Array:
     """Reference point of every circuit (..., circuits, 3), from the origin of N, world axes [m]."""
-    xp = numpy_of(N)
-    points = []
-    for k, row in enumerate(mechanism.circuit_matrix.tolist()):
-        block = N[..., 6 * k : 6 * k + 6, :]
-        chosen = reference_couplings(mechanism, row)
-        twists = [
-            Twist(vector_from_array(block[..., :3, c]), vector_from_array(block[..., 3:, c])) for c in chosen
-        ]
-        points.append(as_array(centre(twists), N.shape[:-2]) if twists else xp.zeros((*N.shape[:-2], 3)))
-    return xp.stack(points, axis=-2) if points else xp.zeros((*N.shape[:-2], 0, 3))
+    mask = _reference_mask(mechanism)
+    return centre(_by_circuit(N) * mask.reshape(*(1 for _ in N.shape[:-2]), *mask.shape))
+
+
+def _by_circuit(N: Array) -> Array:
+    return N.reshape(*N.shape[:-2], N.shape[-2] // 6, 6, N.shape[-1])
 
 
 def referenced(mechanism: Mechanism, N: Array, points: Array | None = None) -> Array:
@@ -148,9 +151,9 @@ def referenced(mechanism: Mechanism, N: Array, points: Array | None = None) -> A
     """
     xp = numpy_of(N)
     points = reference_points(mechanism, N) if points is None else points
-    rows = N.reshape(*N.shape[:-2], N.shape[-2] // 6, 6, N.shape[-1])
+    rows = _by_circuit(N)
     omega, v = rows[..., :3, :], rows[..., 3:, :]
-    moved = v + xp.cross(omega, points[..., None], axis=-2)
+    moved = v + xp.tensordot(points, _CROSS, 1) @ omega
     both = xp.concatenate([omega, moved / characteristic_length(mechanism.robot)], axis=-2)
     return both.reshape(N.shape)
 

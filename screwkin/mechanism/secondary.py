@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 
 from screwkin.algebra.scalar import Scalar, abs_, sqrt
 from screwkin.algebra.screws import Displacement, at
-from screwkin.algebra.se3 import NO_TWIST, UNTURNED, ZERO, Rotation, Twist, Vector, dot
+from screwkin.algebra.se3 import NO_TWIST, UNTURNED, Rotation, Twist, Vector, cross, dot
 from screwkin.compiler.program import Program, Recorder, kept
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.kinematics.positions import frame_pose, link_displacements
@@ -18,7 +18,7 @@ from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.limb_rates import Split, pose_rates, split_of
 from screwkin.mechanism.mechanism import Mechanism, VirtualChain, mechanism_of
 from screwkin.mechanism.network import coupling_twists
-from screwkin.mechanism.scaling import centre, characteristic_length, levers, reference_couplings
+from screwkin.mechanism.scaling import characteristic_length, levers, reference_couplings
 from screwkin.model.robot import Robot
 
 
@@ -62,11 +62,11 @@ def secondary_program(robot: Robot, primary: tuple[str, ...], secondary: tuple[s
             if signs[name]:
                 wanted = wanted - twists[name] * rate * signs[name]
         names = [secondary[i] for i in own]
-        split, point = _split(mechanism, D, names)
+        split, point = _split(mechanism, D, names, twists[names[0]])
         columns = [at(point, twists[name] * signs[name]) for name in names]
         values, determinant = pose_rates(columns, split, at(point, wanted), characteristic_length(robot))
         rates += values
-        least.append(_bound(mechanism, circuit, names, twists, D, determinant))
+        least.append(_bound(mechanism, circuit, names, twists, point, D, determinant))
     recorder.output("secondary", rates)
     recorder.output("least", least)
     return recorder.program()
@@ -87,6 +87,7 @@ def _bound(
     circuit: int,
     names: Sequence[str],
     twists: Mapping[str, Twist],
+    near: Vector,
     D: Sequence[Displacement],
     determinant: Scalar,
 ) -> Scalar:
@@ -95,22 +96,27 @@ def _bound(
     The determinant is the product of the singular values; all but the least have a product of at most that
     of a matrix whose Frobenius norm they share equally.
     """
-    length, row = characteristic_length(mechanism.robot), mechanism.circuit_matrix[circuit].tolist()
-    reference = [mechanism.couplings[c] for c in reference_couplings(mechanism, row)]
-    tip = tip_of(mechanism, reference)
+    length = characteristic_length(mechanism.robot)
+    tip = tip_of(mechanism, circuit)
     sizes = {} if tip is None else _sizes(mechanism.robot, tip, length)
     if all(name in sizes for name in names):
         return abs_(determinant) / (sum(sizes[name] for name in names) / 5) ** 2.5
-    point = centre([twists[x] for x in reference]) if tip is None else _tip(mechanism, D, tip)
-    there = [at(point, twists[name]) for name in names]
+    if tip is not None:
+        point, counted = frame_pose(mechanism.robot, D, tip.name).p, [twists[name] for name in names]
+    else:  # at the point nearest to all axes of the circuit their sum is not larger than at any other
+        point, counted = near, [twists[name] for name in mechanism.circuits[circuit]]
+    there = [at(point, twist) for twist in counted]
     mean = sum(dot(t.omega, t.omega) + dot(t.v, t.v) / length**2 for t in there) / 5
     return abs_(determinant) / (mean * mean * sqrt(mean))
 
 
-def tip_of(mechanism: Mechanism, reference: Sequence[str]) -> VirtualChain | None:
-    """The virtual chain of a tip whose rotations, two at least, are these couplings."""
+def tip_of(mechanism: Mechanism, circuit: int) -> VirtualChain | None:
+    """The virtual chain whose tip is the reference point of a circuit; None if it is another point."""
+    row = mechanism.circuit_matrix[circuit].tolist()
+    reference = {mechanism.couplings[c] for c in reference_couplings(mechanism, row)}
     for chain in mechanism.chains:
-        if chain.limb is not None and len(reference) > 1 and set(reference) <= set(chain.names):
+        turning = {name for name in chain.names if name.split(".")[1][0] == "r"}
+        if chain.limb is not None and len(turning) > 1 and reference == turning:
             return chain
     return None
 
@@ -126,14 +132,13 @@ def _sizes(robot: Robot, tip: VirtualChain, length: float) -> dict[str, float]:
     return own | {j.name: 1 + (r / length) ** 2 for j, r in zip(joints, reach, strict=True)}
 
 
-def _tip(mechanism: Mechanism, D: Sequence[Displacement], tip: VirtualChain) -> Vector:
-    return frame_pose(mechanism.robot, D, tip.name).p
-
-
 def _split(
-    mechanism: Mechanism, D: Sequence[Displacement], names: Sequence[str]
+    mechanism: Mechanism, D: Sequence[Displacement], names: Sequence[str], first: Twist
 ) -> tuple[Split | None, Vector]:
-    """Three neighbouring couplings that meet or are parallel, and where; base axes."""
+    """Three neighbouring couplings that meet or are parallel, and where to express the screws; base axes.
+
+    Without such couplings that is a point near the mechanism, at least on the axis of the first coupling.
+    """
     robot = mechanism.robot
     carried = dict(zip(robot.link_names, D, strict=True))
     for limb in robot.limbs:
@@ -147,4 +152,4 @@ def _split(
         turning = {f"{limb.tip}.{axis}" for axis in ("rx", "ry", "rz")}
         if turning == set(names[-3:]):
             return Split("meeting", len(names) - 3, tip), tip
-    return None, ZERO
+    return None, cross(first.omega, first.v)

@@ -18,7 +18,7 @@ from screwkin.errors import SingularError
 from screwkin.kinematics.status import Status
 from screwkin.mechanism.least_values import least_values, network_values
 from screwkin.mechanism.mechanism import Mechanism
-from screwkin.mechanism.rates import block_name, block_rows, network_of
+from screwkin.mechanism.rates import block_name, block_rows, flat, network_of
 from screwkin.mechanism.scaling import referenced
 from screwkin.model.state import State
 
@@ -56,8 +56,7 @@ def singularity_report(mechanism: Mechanism, at: State | Array) -> tuple[LimbSin
     if isinstance(at, State):
         T, q = np.asarray(at.T_world_base, dtype=float), np.asarray(at.q, dtype=float)
         batch = common_batch((T, q), (2, 1))
-        T = np.broadcast_to(T, (*batch, 4, 4)).reshape(-1, 4, 4)
-        q = np.broadcast_to(q, (*batch, q.shape[-1])).reshape(-1, q.shape[-1])
+        T, q = flat(T, 2, batch), flat(q, 1, batch)
         sigma = least_values(mechanism, T, q)
         worst = sigma.argmin(axis=0)
         N = network_of(mechanism, T[worst], q[worst])
@@ -105,8 +104,7 @@ def refuse_singular(
         return
     batch, blocks = singular.shape[:-1], singular.shape[-1]
     sample, block = (int(i) for i in np.argwhere(np.reshape(singular, (-1, blocks)))[0])
-    T = np.broadcast_to(T_world_base, (*batch, 4, 4)).reshape(-1, 4, 4)[sample]
-    here = State(T, np.broadcast_to(q, (*batch, q.shape[-1])).reshape(-1, q.shape[-1])[sample])
+    here = State(flat(T_world_base, 2, batch)[sample], flat(q, 1, batch)[sample])
     entry = singularity_report(mechanism, here)[block]
     when = "" if time is None else f" (t = {time[sample]:.3f} s)"
     message = f"{entry.limb}, sample {sample}{when}: singular; {entry.cause}; {Status.SINGULAR.help}"

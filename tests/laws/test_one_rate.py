@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import screwkin as sk
 from screwkin.algebra.se3 import ZERO, Twist
-from screwkin.errors import SingularError
+from screwkin.errors import InputError, SingularError
 from screwkin.gait.plan import plan
 from screwkin.gait.realise import differentiate, positions
 from screwkin.gait.stance import stance_of
@@ -289,3 +289,5 @@ def test_a_primary_joint_moves_as_the_caller_says() -> None:
     J = sk.jacobian(other, sk.State(state.T_world_base, q), "left_hand")[..., 3:, 6:]
     assert np.abs(np.einsum("tij,tj->ti", J, moved.qd)).max() < 1e-12
     assert np.abs(moved.qd[:, :i]).max() > 0.1
+    with pytest.raises(InputError, match="left_knee is no primary joint"):
+        joint_motion(again, state.T_world_base, q, twists, twists, {"left_knee": (zero, zero)})
