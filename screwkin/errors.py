@@ -1,10 +1,12 @@
-"""Exceptions of screwkin: every one says where, what was found, what was expected and what to do."""
+"""Exceptions of screwkin: each says where, what stands there, what was expected and what to do."""
 
 from __future__ import annotations
 
+import difflib
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 
 class ScrewkinError(Exception):
@@ -29,7 +31,11 @@ class UnknownNameError(InputError, LookupError):
     def __init__(self, what: str, name: str, valid: Sequence[str]) -> None:
         self.what, self.name, self.valid = what, name, tuple(valid)
         listed = ", ".join(self.valid) if self.valid else "none"
-        super().__init__(f"unknown {what} {name!r}; valid: {listed}")
+        question = near(name, self.valid).rstrip()
+        super().__init__(f"unknown {what} {name!r}; valid: {listed}" + (f". {question}" if question else ""))
+
+    def __reduce__(self) -> Any:
+        return type(self), (self.what, self.name, self.valid)
 
     def __str__(self) -> str:
         return str(self.args[0])
@@ -37,7 +43,7 @@ class UnknownNameError(InputError, LookupError):
 
 @dataclass(frozen=True)
 class Fault:
-    """One wrong place of a file: where it stands, what was found and what would be right."""
+    """One wrong place of a file: where it is, what stands there and what would be right."""
 
     row: str
     key: str
@@ -50,11 +56,14 @@ class Fault:
 
 
 class FileFaults(InputError):
-    """A file with faults; all of them are reported at once, and kept in ``faults``."""
+    """A file with faults; all of them are reported at once, and stand in ``faults``."""
 
     def __init__(self, path: str, faults: Sequence[Fault]) -> None:
         self.path, self.faults = path, tuple(faults)
         super().__init__("\n".join(f"{path}: {fault}" for fault in self.faults))
+
+    def __reduce__(self) -> Any:
+        return type(self), (self.path, self.faults)
 
 
 class TableError(FileFaults):
@@ -113,3 +122,40 @@ class SafetyError(ScrewkinError):
     """Refused because it could damage the robot."""
 
     exit_code = 4
+
+
+def near(name: str, valid: Iterable[str]) -> str:
+    """A question for the nearest valid name, with a blank behind it: ``Did you mean 'knee'?``; or nothing."""
+    close = difflib.get_close_matches(str(name), list(valid), n=1)
+    return f"Did you mean {close[0]!r}? " if close else ""
+
+
+def expect(value: object, kind: type | tuple[type, ...], name: str, give: str) -> None:
+    """Refuse an argument of the wrong kind.
+
+    Args:
+        value: what came.
+        kind: the class, or classes, that it must be of.
+        name: of the argument.
+        give: what to write instead, such as ``load_robot(...)``.
+
+    Raises:
+        InputError: says which kind came, which was expected and what to give.
+    """
+    if not isinstance(value, kind):
+        kinds = kind if isinstance(kind, tuple) else (kind,)
+        wanted = " or ".join(one.__name__ for one in kinds)
+        came = f"the {type(value).__name__} {_short(value)}" if isinstance(value, _PRINTED) else _class(value)
+        raise InputError(f"{name} is {came}, expected {wanted}; give {give}")
+
+
+_PRINTED = (str, int, float, bool)
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 40 else f"{text[:37]}..."
+
+
+def _class(value: object) -> str:
+    return "None" if value is None else f"a {type(value).__name__}"

@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, rotation_exp, rotation_from_array, rotation_log
-from screwkin.errors import InputError, TrajectoryError
+from screwkin.errors import InputError, TrajectoryError, expect
 from screwkin.files import atomic_write, atomic_write_bytes, npz_bytes, read_npz
+from screwkin.model.display import html_table, listing
 from screwkin.model.state import not_rigid
 
 TIP_PREFIX = "T_world_"
@@ -72,6 +73,7 @@ class Trajectory:
 
     def __post_init__(self) -> None:
         faults: list[str] = []
+        expect(self.T_world_tip, Mapping, "T_world_tip", "poses (T, 4, 4) by the name of their tip")
         for name in ("joint_names", "feet"):
             object.__setattr__(self, name, _names(name, getattr(self, name), faults))
         sizes = {
@@ -98,6 +100,29 @@ class Trajectory:
         if faults:
             raise TrajectoryError("; ".join(faults))
 
+    def __reduce__(self) -> Any:
+        """For pickles and copies: constructed anew, checked, with read-only arrays of its own."""
+        values = {f.name: getattr(self, f.name) for f in fields(self) if f.init}
+        values |= {name: dict(values[name]) for name in ("T_world_tip", "meta")}
+        return _restored, (values, self._file_sha256)
+
+    def __repr__(self) -> str:
+        way = ", ".join(f"{x + 0.0:.4g}" for x in self.T_world_base[-1, :3, 3] - self.T_world_base[0, :3, 3])
+        return (
+            f"Trajectory: {self.samples} samples in {self.duration:g} s, {len(self.joint_names)} joints, "
+            f"feet {listing(self.feet)}\n"
+            f"  the base moves by ({way}) m; margin at least {1e3 * self.margin.min():.3g} mm"
+        )
+
+    def _repr_html_(self) -> str:
+        """Shapes and ranges of the arrays, for notebooks."""
+        arrays = {name: array for name, array in _arrays(self).items() if array.dtype.kind == "f"}
+        rows = [
+            [name, str(a.shape), *(f"{x:.4g}" for x in (a.min(initial=np.inf), a.max(initial=-np.inf)))]
+            for name, a in arrays.items()
+        ]
+        return html_table(repr(self).splitlines()[0], ["array", "shape", "least", "largest"], rows)
+
     @property
     def samples(self) -> int:
         """Number of samples T."""
@@ -117,6 +142,12 @@ class Trajectory:
         """Joint positions and rates at other times, (..., n) each, by cubic Hermite interpolation of q, qd.
 
         Before the first and after the last sample the motion rests there.
+
+        Args:
+            times: (...,) [s].
+
+        Returns:
+            q (..., n) [rad or m], and qd (..., n) per second.
         """
         return _hermite(self.time, self.q, self.qd, np.asarray(times, dtype=float))
 
@@ -125,6 +156,9 @@ class Trajectory:
 
         The origin moves on the cubic Hermite spline of its positions and velocities, the orientation turns
         evenly from sample to sample.
+
+        Args:
+            times: (...,) [s].
         """
         times = np.asarray(times, dtype=float)
         T = np.zeros((*times.shape, 4, 4))
@@ -138,6 +172,12 @@ class Trajectory:
 
     def save(self, path: str | Path) -> Path:
         """Write ``.npz``, ``.csv`` or ``.json``, by the suffix of the path.
+
+        Args:
+            path: of the new file; one that exists is replaced.
+
+        Returns:
+            The path.
 
         Raises:
             TrajectoryError: another suffix.
@@ -158,9 +198,14 @@ class Trajectory:
 def load_trajectory(path: str | Path) -> Trajectory:
     """The trajectory of an ``.npz`` file, checked.
 
+    Args:
+        path: of the file.
+
     Raises:
+        InputError: not a path.
         TrajectoryError: not there, truncated, foreign, incomplete, inconsistent, or holding pickles.
     """
+    expect(path, (str, Path), "path", "the path of an .npz file")
     path = Path(path)
     if path.suffix in (".csv", ".json"):
         raise TrajectoryError(f"{path}: a {path.suffix} file holds the joints only; give the .npz beside it")
@@ -173,6 +218,12 @@ def load_trajectory(path: str | Path) -> Trajectory:
     except InputError as error:
         raise TrajectoryError(f"{path}: {error}") from None
     object.__setattr__(trajectory, "_file_sha256", hashlib.sha256(data).hexdigest())
+    return trajectory
+
+
+def _restored(values: Mapping[str, Any], file_sha256: str) -> Trajectory:
+    trajectory = Trajectory(**values)
+    object.__setattr__(trajectory, "_file_sha256", file_sha256)
     return trajectory
 
 

@@ -13,37 +13,19 @@ from typing import Any, TypeVar, dataclass_transform
 import numpy as np
 
 from screwkin.algebra import scalar
+from screwkin.algebra.pytrees import register_with_jax, remember
 from screwkin.algebra.scalar import Scalar, dense, is_jax, is_symbolic, minus, over, plus, times
 
 R = TypeVar("R")
-_RECORDS: list[Any] = []
-_registered_with_jax: set[type] = set()
 
 
 @dataclass_transform(frozen_default=True, eq_default=False)
 def record(cls: type[R]) -> type[R]:
-    """A frozen dataclass that NumPy leaves alone in operators and that JAX can learn about."""
+    """A frozen dataclass that NumPy leaves alone in operators and that is a JAX pytree."""
     made = dataclass(frozen=True, eq=False)(cls)
     made.__array_ufunc__ = None  # type: ignore[attr-defined]
-    _RECORDS.append(made)
+    remember(made)
     return made
-
-
-def register_with_jax() -> None:
-    """Make every record a JAX pytree, so that records may cross ``jit`` and ``vmap`` boundaries.
-
-    All components are leaves, structural 0 and 1 too. A record with static parts says how it is flattened.
-    """
-    import jax
-
-    for cls in _RECORDS:
-        if cls not in _registered_with_jax:
-            _registered_with_jax.add(cls)
-            if hasattr(cls, "flattened"):
-                jax.tree_util.register_pytree_node(cls, cls.flattened, cls.unflattened)
-            else:
-                names = [f.name for f in fields(cls)]
-                jax.tree_util.register_dataclass(cls, data_fields=names, meta_fields=[])
 
 
 def leaves(value: Any) -> list[Scalar]:

@@ -17,6 +17,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.newton import newton
+from screwkin.algebra.pytrees import pytree
 from screwkin.algebra.se3 import NO_TWIST, Pose, as_array, map_scalars, pose_from_array, rotation_log, unstack
 from screwkin.compliance.settling import equilibrium, first_order
 from screwkin.compliance.springs import StiffnessChoice, joint_stiffness
@@ -36,6 +37,7 @@ BLOCK = 4096
 
 
 @dataclass(frozen=True, eq=False)
+@pytree("frames", "method")
 class Deflection:
     """How a robot on one frame yields under its weight; B stands for any leading dimensions.
 

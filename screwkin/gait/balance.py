@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from screwkin.algebra.arrays import Array
+from screwkin.algebra.pytrees import pytree
 from screwkin.compiler.run import run
 from screwkin.dynamics.body import balance
 from screwkin.dynamics.margin import support_margin_fast
@@ -18,6 +19,7 @@ from screwkin.trajectory import Trajectory
 
 
 @dataclass(frozen=True, eq=False)
+@pytree("spikes")
 class Balance:
     """ZMP and what belongs to it, over T samples.
 

@@ -19,9 +19,9 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.errors import Fault
+from screwkin.errors import Fault, near
 from screwkin.gait.motion import Function
-from screwkin.model.expression import ExpressionError, evaluate, near
+from screwkin.model.expression import ExpressionError, evaluate
 
 HARMONICS = ("forward", "side")
 BUMPS = ("start_forward", "start_side", "stop_forward", "stop_side")

@@ -11,11 +11,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, cast
 
-from screwkin.errors import Fault, GaitError
+from screwkin.errors import Fault, GaitError, near
 from screwkin.gait.free_path import read_free_waist
 from screwkin.gait.keypoints import CHANNELS, Channel, channel_faults, increases, read_channel
 from screwkin.gait.settings import place, valid_keys
-from screwkin.model.expression import near, resolve_parameters
+from screwkin.model.expression import resolve_parameters
 
 Kind = Literal["geometric", "preview"]
 Swing = Literal["cubic", "minimum-jerk"]
@@ -96,6 +96,12 @@ class Gait:
     waist: Mapping[str, tuple[float, ...]]
     path: str = ""
     _document: Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+    def __repr__(self) -> str:
+        return (
+            f"Gait {self.name!r} ({self.kind}): {self.steps} steps of {self.Tc:g} s, "
+            f"stride {self.stride:g} m, side {self.side:g} m, turn {self.turn:g} rad, rate {self.rate:g} Hz"
+        )
 
     def replace(self, **parameters: Any) -> Gait:
         """The gait with other parameters; numbers may be given as text or formulas, as on a command line.

@@ -7,7 +7,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, pose_from_array, unstack
-from screwkin.errors import InputError
+from screwkin.errors import expect
 from screwkin.gait.balance import ground_margin, ground_reaction, soles_on_floor
 from screwkin.gait.driven import driven
 from screwkin.gait.plan import Plan, plan
@@ -18,7 +18,7 @@ from screwkin.gait.stance import stance_of
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.mechanism.choice import closed_mechanism
 from screwkin.mechanism.rates import block_names
-from screwkin.model.robot import Robot
+from screwkin.model.robot import Robot, robot_text
 from screwkin.trajectory import Trajectory
 
 TRACED = ("numpy", "scipy", "screwkin")
@@ -42,7 +42,9 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
         UnreachableError, SingularError, LimitError: names limb, sample and time.
         GaitError, InputError: the gait does not fit the robot.
     """
-    _check_kinds(robot, gait)
+    expect(robot, Robot, "robot", 'load_robot("NAME")')
+    expect(gait, Gait, "gait", 'load_gait("NAME")')
+    table = robot_text(robot)
     steps = gait.steps if steps is None else steps
     whole = stance_of(robot)
     drive = driven(robot)
@@ -77,8 +79,8 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
         meta={
             "robot": {
                 "name": robot.name,
-                "table": robot.text,
-                "sha256": hashlib.sha256(robot.text.encode()).hexdigest(),
+                "table": table,
+                "sha256": hashlib.sha256(table.encode()).hexdigest(),
             },
             "gait": gait.to_dict(),
             "steps": steps,
@@ -90,11 +92,6 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
             "command": command,
         },
     )
-
-
-def _check_kinds(robot: object, gait: object) -> None:
-    if not (isinstance(robot, Robot) and isinstance(gait, Gait)):
-        raise InputError("walk takes a robot from load_robot and a gait from load_gait, not names or paths")
 
 
 def _tip_poses(robot: Robot, planned: Plan, q: Array) -> dict[str, Array]:

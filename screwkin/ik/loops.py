@@ -16,6 +16,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.newton import newton
 from screwkin.algebra.pattern import components
+from screwkin.algebra.pytrees import pytree
 from screwkin.algebra.screws import at
 from screwkin.algebra.se3 import as_array, pose_from_array, rotation_log, unstack, vector_from_array
 from screwkin.errors import InputError, LimitError, ShapeError, SingularError, UnreachableError
@@ -27,6 +28,7 @@ from screwkin.model.state import State
 
 
 @dataclass(frozen=True, eq=False)
+@pytree("limbs")
 class PoseSolution:
     """Positions of a batch, with a status for every limb.
 

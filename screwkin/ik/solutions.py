@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from screwkin.algebra.arrays import Array
+from screwkin.algebra.pytrees import pytree
 from screwkin.errors import InputError
 from screwkin.kinematics.serial_chain import Chain
 from screwkin.kinematics.status import Status
@@ -19,6 +20,7 @@ ABSENT = 1e6
 
 
 @dataclass(frozen=True, eq=False)
+@pytree("limb", "joint_names", "method")
 class LimbSolutions:
     """Joint positions that put a limb's tip at its targets; k branches, n joints, best branch first.
 

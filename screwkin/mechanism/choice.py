@@ -15,7 +15,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import UNTURNED, Rotation, norm, rotation_log
-from screwkin.errors import InputError, SingularError, UnknownNameError
+from screwkin.errors import InputError, SingularError, UnknownNameError, expect
 from screwkin.kinematics.positions import link_displacements
 from screwkin.mechanism.mechanism import Mechanism, coupling_graph, virtual_chains
 from screwkin.mechanism.network import coupling_twists, network_matrix
@@ -103,6 +103,7 @@ def closed_mechanism(robot: Robot, primary: Sequence[str] | None = None) -> Mech
 
     Source: Davies (1981); paper A, eq. 9-11, 15.
     """
+    expect(robot, Robot, "robot", 'load_robot("NAME")')
     chains = virtual_chains(robot)
     graph = coupling_graph(robot, chains)
     bare = Mechanism(robot, chains, graph, (), tuple(name for name, _, _ in graph.edges), 0)

@@ -175,7 +175,7 @@ def nearest_closed(robot: Robot, q: Array) -> Array:
     Raises:
         NoSolutionError: none is found from there; the message tells the gap that is left.
     """
-    single = replace(robot, limbs=())
+    single = replace(robot, limbs=(), soles=())
     chains = virtual_chains(single)
     graph = coupling_graph(single, chains)
     mechanism = Mechanism(single, chains, graph, (), tuple(name for name, _, _ in graph.edges), 0)

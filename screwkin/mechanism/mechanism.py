@@ -17,6 +17,7 @@ from screwkin.algebra.se3 import IDENTITY, Pose
 from screwkin.mechanism import graph as graphs
 from screwkin.mechanism.chains import SPATIAL, check_chain, held_pose
 from screwkin.mechanism.graph import Graph, Integers
+from screwkin.model.display import html_table, listing
 from screwkin.model.robot import Limb, Robot
 
 FLOOR = "floor"
@@ -147,6 +148,19 @@ class Mechanism:
     def kutzbach(self) -> int:
         """Mobility by counting, 6 (links - joints - 1) + sum of freedoms: blind to special geometry."""
         return 6 * (len(self.links) - 1) - 5 * len(self.couplings)
+
+    def __repr__(self) -> str:
+        return (
+            f"Mechanism of {self.robot.name!r}: {len(self.couplings)} couplings, {len(self.links)} links, "
+            f"{len(self.circuits)} circuits, mobility {self.mobility}\n"
+            f"  primary: {listing(self.primary)}\n  secondary: {listing(self.secondary)}"
+        )
+
+    def _repr_html_(self) -> str:
+        """The circuits with their couplings and signs, for notebooks."""
+        signed = [", ".join(f"{'-' if s < 0 else '+'}{c}" for c, s in one.items()) for one in self.circuits]
+        rows = list(zip(self.circuit_names, signed, strict=True))
+        return html_table(repr(self).splitlines()[0], ["circuit", "couplings"], rows)
 
 
 def virtual_chains(robot: Robot) -> tuple[VirtualChain, ...]:

@@ -1,4 +1,4 @@
-"""Sound rows of a robot table made into the records of a ``Robot``, mirrored limbs included."""
+"""From sound rows of a robot table to the records of the robot, mirrored limbs included."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from screwkin.model.mirror import (
     reflected_link,
     reflected_sole,
 )
-from screwkin.model.robot import Box, Closure, Inertia, Joint, Limb, Link, Posture, Robot, Sole
+from screwkin.model.records import Box, Closure, Inertia, Joint, Limb, Link, Posture, RobotRecord, Sole
 from screwkin.model.rows import Rows
 from screwkin.model.schema import ClosureRow, FrameRow, InertiaRow, JointRow, LimbRow, LinkRow, MirrorRow
 from screwkin.model.structure import Mirrored
 
 
-def robot_from_rows(rows: Rows, joints: Sequence[Joint], mirrored: Sequence[Mirrored]) -> Robot:
-    """The robot of rows without faults; ``joints`` are its joints, mirrored ones included."""
+def robot_from_rows(rows: Rows, joints: Sequence[Joint], mirrored: Sequence[Mirrored]) -> RobotRecord:
+    """The records of rows without faults; ``joints`` are its joints, mirrored ones included."""
     robot = rows.robot.row
-    return Robot(
+    return RobotRecord(
         name=robot.name,
         description=robot.description,
         source=robot.source,

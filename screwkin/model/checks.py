@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from screwkin.errors import Fault
+from screwkin.model.records import Sole
 from screwkin.model.rows import Rows
 from screwkin.model.schema import InertiaRow, JointRow, LinkRow, SoleRow
 
@@ -52,12 +53,12 @@ def _inertia(inertia: InertiaRow) -> Iterator[tuple[str, str, str]]:
         return
     xx, yy, zz, xy, xz, yz = (float(getattr(inertia, name)) for name in _COMPONENTS)
     a, b, c = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    told = f"principal moments ({a:.6g}, {b:.6g}, {c:.6g})"
+    moments = f"principal moments ({a:.6g}, {b:.6g}, {c:.6g})"
     about = "Give the inertia about the CoM in base axes"
     if a < -_RELATIVE * abs(c) or c < 0:
-        yield "inertia", f"{told} are not all >= 0: no body has them", about
+        yield "inertia", f"{moments} are not all >= 0: no body has them", about
     elif c > (a + b) * (1 + _RELATIVE):
-        found = f"{told} break the triangle inequality: {c:.6g} > {a:.6g} + {b:.6g}, no body has them"
+        found = f"{moments} break the triangle inequality: {c:.6g} > {a:.6g} + {b:.6g}, no body has them"
         yield "inertia", found, about
 
 
@@ -70,7 +71,8 @@ def _joint(joint: JointRow) -> Iterator[tuple[str, str, str]]:
         yield "lower", f"{joint.lower:g} is above upper {joint.upper:g}", "Swap the limits"
 
 
-def _sole(sole: SoleRow) -> Iterator[tuple[str, str, str]]:
+def sole_faults(sole: SoleRow | Sole) -> Iterator[tuple[str, str, str]]:
+    """Key, what is wrong and what is right, for a sole that is no convex flat polygon."""
     if len(sole.corners) < 3:
         yield "corners", f"{len(sole.corners)} given", "Write three or more corners"
         return
@@ -92,5 +94,5 @@ def _sole(sole: SoleRow) -> Iterator[tuple[str, str, str]]:
 _CHECKS: Mapping[str, Callable[[Any], Iterator[tuple[str, str, str]]]] = {
     "link": _link,
     "joint": _joint,
-    "sole": _sole,
+    "sole": sole_faults,
 }

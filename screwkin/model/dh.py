@@ -65,7 +65,9 @@ class DHTable:
 def dh_frames(table: DHTable, q: Sequence[Scalar]) -> list[Pose]:
     """Frames 0 to n of a chain in the base frame; frame 0 is ``table.base``, the tool is not applied.
 
-    A formula: q holds n scalars of any kind [rad or m].
+    Args:
+        table: of n joints.
+        q: n scalars of any kind [rad or m].
 
     Raises:
         ShapeError: q has not one value for each joint.
@@ -79,7 +81,15 @@ def dh_frames(table: DHTable, q: Sequence[Scalar]) -> list[Pose]:
 
 
 def dh_fk(table: DHTable, q: Sequence[Scalar]) -> Pose:
-    """Pose of the tip in the base frame."""
+    """Pose of the tip in the base frame.
+
+    Args:
+        table: of n joints.
+        q: n scalars of any kind [rad or m].
+
+    Raises:
+        ShapeError: q has not one value for each joint.
+    """
     return dh_frames(table, q)[-1] @ table.tool
 
 
@@ -92,7 +102,14 @@ def dh_jacobian(table: DHTable, frames: Sequence[Pose]) -> list[Twist]:
 
 
 def screws_from_dh(table: DHTable) -> tuple[list[Screw], Pose]:
-    """The joints' screws and the tip's pose in the zero pose, in the base frame."""
+    """The joints' screws and the tip's pose in the zero pose, in the base frame.
+
+    Args:
+        table: of n joints; lengths in [m], angles in [rad].
+
+    Returns:
+        n screws, their points in [m], and the pose of the tip.
+    """
     frames = dh_frames(table, [0] * len(table.rows))
     return _axes(table, frames), frames[-1] @ table.tool
 

@@ -7,7 +7,7 @@
 
 Angles are ``alpha_deg`` and ``offset_deg``, or ``_rad``; lengths ``a_mm`` and ``d_mm``, or ``_m``. ``limb``
 may be left out of a file of one chain, ``type`` (revolute, prismatic, fixed) where all joints are revolute.
-Fixed rows before a chain's joints are its base, fixed rows behind them its tool, and those bear the tip's
+Fixed rows before a chain's joints are its base, fixed rows behind them its tool, and those have the tip's
 name. Blank lines and lines that begin with # are comments.
 """
 
@@ -22,10 +22,10 @@ from pathlib import Path
 from typing import cast
 
 from screwkin.algebra.se3 import IDENTITY, Pose
-from screwkin.errors import Fault, TableError
+from screwkin.errors import Fault, TableError, near
 from screwkin.model.dh import CONVENTIONS, Convention, DHRow, DHTable, DHType, row_transform
 from screwkin.model.dh_derive import fixed_rows
-from screwkin.model.expression import listed, near
+from screwkin.model.expression import listed
 from screwkin.model.toml import read_text
 
 UNITS: Mapping[str, tuple[str, ...]] = {
@@ -47,6 +47,9 @@ _ONLY = "chain"  # name of a chain that has none
 def load_dh(path: str | Path) -> tuple[DHTable, ...]:
     """The chains of a file, in its order.
 
+    Args:
+        path: of a CSV file as the module's head describes.
+
     Raises:
         TableError: the file cannot be read or has faults; it lists all of them.
     """
@@ -55,6 +58,10 @@ def load_dh(path: str | Path) -> tuple[DHTable, ...]:
 
 def parse_dh(text: str, path: str = "<text>") -> tuple[DHTable, ...]:
     """The chains of a text.
+
+    Args:
+        text: CSV as the module's head describes.
+        path: where it comes from, for messages.
 
     Raises:
         TableError: the text has faults; it lists all of them.

@@ -91,6 +91,11 @@ def dh_from_screws(
 def dh_from_limb(robot: Robot, limb: str, convention: Convention = "modified") -> DHTable:
     """The table of a limb, from the robot's base frame to the limb's tip, with the joints' names.
 
+    Args:
+        robot: any robot of numbers.
+        limb: name of the limb or of its tip.
+        convention: ``standard`` or ``modified``.
+
     Raises:
         UnknownNameError: no such limb or convention.
         InputError: the limb has a helical joint.
@@ -203,8 +208,8 @@ def _line_of(screw: Screw, name: str) -> _Line:
     s, s0 = (map_scalars(lambda x: _number(x, f"joint {name!r}"), v) for v in (screw.s, screw.s0))
     length = norm(s)
     if abs(length - 1) > UNIT_TOLERANCE:
-        told = ", ".join(f"{c:g}" for c in s)
-        raise InputError(f"joint {name!r}: axis ({told}) has norm {length:.10g}, expected 1")
+        given = ", ".join(f"{c:g}" for c in s)
+        raise InputError(f"joint {name!r}: axis ({given}) has norm {length:.10g}, expected 1")
     return _Line(s / length, s0)
 
 

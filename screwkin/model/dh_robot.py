@@ -1,4 +1,4 @@
-"""A robot made of DH tables: the same chains as screws, without masses."""
+"""A robot from DH tables: the same chains as screws, without masses."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from collections.abc import Sequence
 from screwkin.algebra.se3 import UNTURNED, ZERO, Pose, as_array
 from screwkin.errors import InputError
 from screwkin.model.dh import DHTable, screws_from_dh
-from screwkin.model.robot import Inertia, Joint, Limb, LimbKind, Link, Robot
-from screwkin.model.table import parse_robot
+from screwkin.model.records import Inertia, Joint, Limb, LimbKind, Link, RobotRecord
+from screwkin.model.robot import Robot
 from screwkin.model.toml_out import robot_toml
 from screwkin.model.values import COUPLINGS
 
 BASE = "base_link"
 """The link from which all chains start."""
 
-_SAME = 1e-9  # rad and m: two tables that share a joint tell the same axis
+_SAME = 1e-9  # rad and m: two tables that share a joint describe the same axis
 _LEG = re.compile(r"(?<![A-Za-z])(leg|foot)(?![a-z])", re.IGNORECASE)
 _NO_LIMIT = float("inf")
 
@@ -25,7 +25,12 @@ def robot_from_dh(tables: Sequence[DHTable], name: str, path: str = "<tables>") 
     """The robot of some chains, each a limb: a leg if its name says leg or foot, else an arm.
 
     Chains that begin with the same joints share them. Links are massless and joints unlimited, as DH tables
-    tell neither; the base floats if there is a leg.
+    say neither; the base floats if there is a leg.
+
+    Args:
+        tables: one for each limb.
+        name: of the robot.
+        path: where they come from, for messages and for ``Robot.path``.
 
     Raises:
         InputError: chains that share a joint but not what leads to it.
@@ -50,7 +55,7 @@ def robot_from_dh(tables: Sequence[DHTable], name: str, path: str = "<tables>") 
         limbs.append(Limb(table.name, kind, parent, table.tip, tool, COUPLINGS))
     links = [_massless(BASE, Pose(UNTURNED, ZERO))]
     links += [_massless(joint.child, Pose(UNTURNED, joint.screw.s0)) for joint in joints.values()]
-    robot = Robot(
+    robot = RobotRecord(
         name=name,
         description="",
         source="Denavit-Hartenberg tables",
@@ -60,7 +65,7 @@ def robot_from_dh(tables: Sequence[DHTable], name: str, path: str = "<tables>") 
         joints=tuple(joints.values()),
         limbs=tuple(limbs),
     )
-    return parse_robot(robot_toml(robot), path)
+    return Robot.from_text(robot_toml(robot), path)
 
 
 def _massless(name: str, frame: Pose) -> Link:

@@ -8,7 +8,6 @@ sympy symbols among them it is an expression.
 from __future__ import annotations
 
 import ast
-import difflib
 import math
 import operator
 from collections.abc import Callable, Iterable, Mapping
@@ -17,7 +16,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from screwkin.algebra.scalar import Scalar, is_symbolic
-from screwkin.errors import Fault, InputError
+from screwkin.errors import Fault, InputError, near
 
 CONSTANTS = ("pi", "deg", "mm")
 """Names that every table knows: pi, one degree in rad, one millimetre in m."""
@@ -50,12 +49,6 @@ class UnresolvedError(ExpressionError):
     """A formula is sound but uses a parameter that has a fault of its own, reported there."""
 
 
-def near(name: str, valid: Iterable[str]) -> str:
-    """A question for the nearest valid name, with a blank behind it: ``Did you mean 'knee'?``; or nothing."""
-    close = difflib.get_close_matches(name, list(valid), n=1)
-    return f"Did you mean {close[0]!r}? " if close else ""
-
-
 def listed(names: Iterable[str]) -> str:
     """Names for a message, in their order."""
     return ", ".join(names) or "none"
@@ -79,23 +72,23 @@ def evaluate(value: object, names: Mapping[str, Scalar]) -> Scalar:
         return _finite(value, repr(value))
     if not isinstance(value, str):
         raise ExpressionError(f"{value!r} is not a number", "Write a number, or a formula in quotes")
-    tree, told = _parse(value), _told(value)
+    tree, quoted = _parse(value), _quoted(value)
     used = [names[name] for name in _names(tree) if name in names]
     symbolic = any(is_symbolic(x) for x in used)
     try:
-        result = _value(tree, told, names, _symbols() if symbolic else _FLOATS)
+        result = _value(tree, quoted, names, _symbols() if symbolic else _FLOATS)
     except ZeroDivisionError:
-        raise ExpressionError(f"{told} divides by zero", "Check the parameters it uses") from None
+        raise ExpressionError(f"{quoted} divides by zero", "Check the parameters it uses") from None
     except OverflowError:
-        raise ExpressionError(f"{told} is too large for a number", "Check its powers") from None
+        raise ExpressionError(f"{quoted} is too large for a number", "Check its powers") from None
     except RecursionError:
-        raise ExpressionError(f"{told} is nested too deeply", "Split it by parameters") from None
+        raise ExpressionError(f"{quoted} is nested too deeply", "Split it by parameters") from None
     except (ValueError, TypeError) as error:
         if isinstance(error, ExpressionError):
             raise
         fix = "Keep sqrt to numbers >= 0, asin and acos to [-1, 1], fractional powers to numbers >= 0"
-        raise ExpressionError(f"{told} has no real value", fix) from None
-    return result if symbolic and _is_open(result) else _finite(result, told)
+        raise ExpressionError(f"{quoted} has no real value", fix) from None
+    return result if symbolic and _is_open(result) else _finite(result, quoted)
 
 
 def names_in(value: object) -> tuple[str, ...]:
@@ -166,18 +159,18 @@ def _is_open(result: Scalar) -> bool:
     return bool(sympy.sympify(result).free_symbols) and not result.has(sympy.zoo, sympy.nan, sympy.oo)
 
 
-def _finite(number: Any, told: str) -> float:
+def _finite(number: Any, quoted: str) -> float:
     """A finite float, or the fault that it is none."""
     try:
         result = float(number)
     except (OverflowError, TypeError, ValueError):
-        raise ExpressionError(f"{told} has no finite real value", "Write a finite number") from None
+        raise ExpressionError(f"{quoted} has no finite real value", "Write a finite number") from None
     if not math.isfinite(result):
-        raise ExpressionError(f"{told} is not finite", "Write a finite number")
+        raise ExpressionError(f"{quoted} is not finite", "Write a finite number")
     return result
 
 
-def _told(text: str) -> str:
+def _quoted(text: str) -> str:
     """The formula in a message: in quotes, a long one cut."""
     return repr(text if len(text) <= 80 else f"{text[:77]}...")
 
@@ -188,7 +181,7 @@ def _parse(text: str) -> ast.expr:
     try:
         return ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError):
-        raise ExpressionError(f"{_told(text)} is not a formula", _GRAMMAR) from None
+        raise ExpressionError(f"{_quoted(text)} is not a formula", _GRAMMAR) from None
 
 
 def _names(tree: ast.expr) -> tuple[str, ...]:
@@ -196,17 +189,17 @@ def _names(tree: ast.expr) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for name in found if name not in CONSTANTS and name not in FUNCTIONS))
 
 
-def _value(node: ast.expr, told: str, names: Mapping[str, Scalar], kind: SimpleNamespace) -> Scalar:
+def _value(node: ast.expr, quoted: str, names: Mapping[str, Scalar], kind: SimpleNamespace) -> Scalar:
     """The value of one node of the tree; whatever is not understood is refused by name."""
 
     def value(child: ast.expr) -> Scalar:
-        return _value(child, told, names, kind)
+        return _value(child, quoted, names, kind)
 
     match node:
         case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
             return kind.number(number)
         case ast.Name(id=name):
-            return kind.constants[name] if name in CONSTANTS else _looked_up(name, told, names)
+            return kind.constants[name] if name in CONSTANTS else _looked_up(name, quoted, names)
         case ast.UnaryOp(op=ast.USub(), operand=operand):
             return -value(operand)
         case ast.UnaryOp(op=ast.UAdd(), operand=operand):
@@ -218,23 +211,23 @@ def _value(node: ast.expr, told: str, names: Mapping[str, Scalar], kind: SimpleN
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if name in FUNCTIONS:
             if len(arguments) != _ARITY.get(name, max(1, len(arguments))):
                 wanted = _ARITY.get(name, "one or more")
-                raise ExpressionError(f"{told} gives {name} {len(arguments)} arguments", f"Give {wanted}")
+                raise ExpressionError(f"{quoted} gives {name} {len(arguments)} arguments", f"Give {wanted}")
             return kind.functions[name](*map(value, arguments))
         case ast.Call(func=ast.Name(id=name)) if name not in FUNCTIONS:
             fix = f"{near(name, FUNCTIONS)}Functions: {listed(FUNCTIONS)}"
-            raise ExpressionError(f"{told} calls {name!r}, which is no function of a table", fix)
+            raise ExpressionError(f"{quoted} calls {name!r}, which is no function of a table", fix)
         case ast.BinOp(op=ast.BitXor()):
-            raise ExpressionError(f"{told} uses ^", "Write powers with **")
+            raise ExpressionError(f"{quoted} uses ^", "Write powers with **")
     part = ast.unparse(node)
-    raise ExpressionError(f"{told} is not arithmetic: {part!r} is refused", _GRAMMAR)
+    raise ExpressionError(f"{quoted} is not arithmetic: {part!r} is refused", _GRAMMAR)
 
 
-def _looked_up(name: str, told: str, names: Mapping[str, Scalar]) -> Scalar:
+def _looked_up(name: str, quoted: str, names: Mapping[str, Scalar]) -> Scalar:
     if name not in names:
         fix = f"{near(name, [*names, *CONSTANTS])}Names: {listed([*names, *CONSTANTS])}"
-        raise ExpressionError(f"{told} uses the unknown name {name!r}", fix)
+        raise ExpressionError(f"{quoted} uses the unknown name {name!r}", fix)
     if names[name] is None:
-        raise UnresolvedError(f"{told} uses {name!r}, which is faulty itself", f"Mend {name!r}")
+        raise UnresolvedError(f"{quoted} uses {name!r}, which is faulty itself", f"Mend {name!r}")
     return names[name]
 
 

@@ -1,4 +1,4 @@
-"""Where robots, gaits and papers are found: bundled ones by name, any other by its path."""
+"""Where robots, gaits and papers are: bundled ones by name, any other by its path."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def gait_names() -> tuple[str, ...]:
 
 
 def paper_names() -> tuple[str, ...]:
-    """Names of the bundled lists of what papers tell, to be reproduced."""
+    """Names of the bundled lists of what papers report, to be reproduced."""
     return _names(PAPERS)
 
 
@@ -70,7 +70,8 @@ def _find(what: str, kind: str, name_or_path: str | Path) -> Path:
     name, valid = str(name_or_path), _names(kind)
     if name in valid:
         return data_folder(kind) / f"{name}.toml"
-    looks_like_path = isinstance(name_or_path, Path) or name.endswith(".toml") or "/" in name or "\\" in name
+    suffixed = name.lower().endswith((".toml", ".urdf", ".csv"))
+    looks_like_path = isinstance(name_or_path, Path) or suffixed or "/" in name or "\\" in name
     if looks_like_path and _exists(Path(name)):
         return Path(name)
     raise UnknownNameError(f"{what} file" if looks_like_path else what, name, valid)

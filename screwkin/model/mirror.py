@@ -15,7 +15,7 @@ from typing import TypeVar
 
 from screwkin.algebra.screws import Screw
 from screwkin.algebra.se3 import Pose, Rotation, Vector
-from screwkin.model.robot import Box, Closure, Inertia, Joint, Limb, Link, Sole
+from screwkin.model.records import Box, Closure, Inertia, Joint, Limb, Link, Sole
 
 Item = TypeVar("Item")
 

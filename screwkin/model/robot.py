@@ -1,143 +1,162 @@
-"""The robot as a value: what a screw table says, checked and evaluated.
-
-Every point, axis, CoM, inertia, box and sole is told in the zero pose (all q = 0), in base axes from the
-base origin. Numbers are scalars: floats as a rule, sympy symbols in the symbolic twin of a table.
-"""
+"""The robot as a value: the checked records of a screw table, and questions about them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any, Self
 
 from screwkin.algebra.scalar import Scalar
-from screwkin.algebra.screws import Screw
 from screwkin.algebra.se3 import UNTURNED, Pose, Vector
-from screwkin.errors import UnknownNameError
+from screwkin.errors import InputError, UnknownNameError, expect
+from screwkin.model.changes import changed_text, check_followed
+from screwkin.model.display import figure, html_table, listing
+from screwkin.model.reading import read_table
+from screwkin.model.record_faults import check_records, vars_of
+from screwkin.model.records import (
+    Box,
+    Closure,
+    Inertia,
+    Joint,
+    JointType,
+    Limb,
+    LimbKind,
+    Link,
+    Posture,
+    RobotRecord,
+    Sole,
+    is_open,
+    same_content,
+)
+from screwkin.model.sound import are_inertias
+from screwkin.model.toml_out import robot_toml
 
-JointType = Literal["revolute", "prismatic", "helical"]
-LimbKind = Literal["leg", "arm"]
-
-
-@dataclass(frozen=True)
-class Box:
-    """A box with edges along the base axes: centre and edge lengths [m]."""
-
-    center: Vector
-    size: Vector
-
-
-@dataclass(frozen=True)
-class Inertia:
-    """Rotational inertia about the CoM, in base axes [kg m^2]."""
-
-    xx: Scalar
-    yy: Scalar
-    zz: Scalar
-    xy: Scalar = 0
-    xz: Scalar = 0
-    yz: Scalar = 0
-
-    def times(self, w: Vector) -> Vector:
-        """The inertia applied to an angular velocity."""
-        return Vector(
-            w.x * self.xx + w.y * self.xy + w.z * self.xz,
-            w.x * self.xy + w.y * self.yy + w.z * self.yz,
-            w.x * self.xz + w.y * self.yz + w.z * self.zz,
-        )
-
-
-@dataclass(frozen=True)
-class Link:
-    """A rigid body: mass [kg], CoM, inertia, its own frame, and boxes for contact and pictures."""
-
-    name: str
-    mass: Scalar
-    com: Vector
-    inertia: Inertia
-    frame: Pose
-    boxes: tuple[Box, ...] = ()
-
-
-@dataclass(frozen=True)
-class Joint:
-    """A screw joint between two links, with limits in rad (m for prismatic), rad/s and N m."""
-
-    name: str
-    parent: str
-    child: str
-    type: JointType
-    screw: Screw
-    lower: float
-    upper: float
-    velocity: float
-    effort: float
-
-
-@dataclass(frozen=True)
-class Closure:
-    """Two frames on two links that must coincide: it closes a loop of the tree."""
-
-    name: str
-    link_a: str
-    frame_a: Pose
-    link_b: str
-    frame_b: Pose
-
-
-@dataclass(frozen=True)
-class Limb:
-    """A leg or an arm: its tip is a frame on its last link, where its virtual chain is attached."""
-
-    name: str
-    kind: LimbKind
-    link: str
-    tip: str
-    frame: Pose
-    chain: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class Sole:
-    """The contact polygon of a leg: corners in the zero pose, counter-clockwise seen from above."""
-
-    limb: str
-    corners: tuple[Vector, ...]
-
-
-@dataclass(frozen=True)
-class Posture:
-    """Named joint positions, and the height of the base above the floor [m]."""
-
-    name: str
-    base_height: float
-    q: tuple[float, ...]
+__all__ = [
+    "Box",
+    "Closure",
+    "Inertia",
+    "Joint",
+    "JointType",
+    "Limb",
+    "LimbKind",
+    "Link",
+    "Posture",
+    "Robot",
+    "Sole",
+    "refuse_closures",
+    "robot_text",
+]
 
 
 @dataclass(frozen=True, eq=False)
-class Robot:
+class Robot(RobotRecord):
     """A robot or mechanism. Links and joints stand in table order; q is in the order of ``joints``.
 
-    waist: the frame that gaits steer, fixed to the base link, in base axes; None: found from the hips.
+    Fields are those of ``RobotRecord``. However it is made, it is checked as a table file is.
+
+    Raises:
+        TableError: the records have faults; it lists all of them.
     """
 
-    name: str
-    description: str
-    source: str
-    base: Literal["floating", "fixed"]
-    base_link: str
-    links: tuple[Link, ...]
-    joints: tuple[Joint, ...]
-    limbs: tuple[Limb, ...] = ()
-    soles: tuple[Sole, ...] = ()
-    closures: tuple[Closure, ...] = ()
-    postures: tuple[Posture, ...] = ()
-    waist: Pose | None = None
-    servos: Mapping[str, Any] = field(default_factory=dict)
-    parameters: Mapping[str, Scalar] = field(default_factory=dict)
-    text: str = ""
-    path: str = ""
+    def __post_init__(self) -> None:
+        check_records(self)
+
+    @classmethod
+    def from_text(cls, text: str, path: str = "<text>", symbolic: bool = False) -> Self:
+        """The robot of a table's text in TOML, see ``parse_robot``."""
+        robot = cls(**vars(read_table(text, path, symbolic)))
+        robot.__dict__["text_matches"] = True
+        return robot
+
+    def replace(
+        self,
+        *,
+        masses: Mapping[str, float | str] | None = None,
+        limits: Mapping[str, tuple[float, float]] | None = None,
+        velocity: Mapping[str, float | str] | None = None,
+        effort: Mapping[str, float | str] | None = None,
+        name: str | None = None,
+        **parameters: float | str,
+    ) -> Self:
+        """The robot of the same table with other numbers; everything that depends on them follows.
+
+        Formulas, mirrored rows, inertias by box, soles and postures are evaluated anew, and ``text`` is the
+        table of the new robot, with its comments where the values stand in rows of their own. It stands in no
+        file, so ``path`` is none.
+
+        Args:
+            masses: of links, by name [kg]; a mirrored link follows the one that it mirrors.
+            limits: (lower, upper) of joints, by name [rad or m]; infinite for no limit.
+            velocity: greatest speeds of joints, by name [rad/s or m/s]; infinite for no limit.
+            effort: greatest torques or forces of joints, by name [N m or N]; infinite for no limit.
+            name: of the robot.
+            **parameters: of the table, by name: numbers, or formulas over the other parameters.
+
+        Raises:
+            UnknownNameError: no such parameter, link or joint; it lists the valid ones.
+            InputError: a value that is no number, or for a mirrored row alone.
+            TableError: the new values break a rule of tables, such as a posture beyond the new limits.
+
+        Example:
+            >>> import screwkin as sk
+            >>> robot = sk.load_robot("linkages/four-bar")
+            >>> robot.replace(crank=0.05).parameters["crank"]
+            0.05
+        """
+        given = {"masses": masses, "limits": limits, "velocity": velocity, "effort": effort}
+        wishes = {what: {} if wanted is None else wanted for what, wanted in given.items()}
+        for what, wanted in wishes.items():
+            expect(wanted, Mapping, what, "values by the name of their link or joint")
+        text = changed_text(self, robot_text(self), name, parameters, wishes)
+        robot = self.from_text(text, f"<{self.name}, changed>", self._is_symbolic)
+        check_followed(robot, wishes)
+        return robot
+
+    @cached_property
+    def text_matches(self) -> bool:
+        """Whether ``text`` is a table of exactly this robot; ``dataclasses.replace`` leaves it behind."""
+        try:
+            return bool(self.text) and same_content(self, read_table(self.text, self.path, self._is_symbolic))
+        except InputError:
+            return False
+
+    @property
+    def _is_symbolic(self) -> bool:
+        return any(is_open(x) for x in self.parameters.values())
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields, for pickles and copies, without what is cached beside them."""
+        return vars_of(self)
+
+    def __repr__(self) -> str:
+        limbs = [f"{limb.name} ({len(self.path_to(limb.link))} joints to {limb.tip})" for limb in self.limbs]
+        closures = [f"  closures: {listing(c.name for c in self.closures)}"] if self.closures else []
+        return "\n".join(
+            [
+                f"Robot {self.name!r}: {self.base} base {self.base_link!r}, {len(self.links)} links, "
+                f"{len(self.joints)} joints, {figure(self.mass)} kg",
+                f"  joints: {listing(self.joint_names)}",
+                f"  limbs: {listing(limbs)}",
+                *closures,
+            ]
+        )
+
+    def _repr_html_(self) -> str:
+        """The screw table, for notebooks."""
+        rows = [
+            [
+                joint.name,
+                joint.parent,
+                joint.child,
+                joint.type,
+                *(", ".join(map(figure, v)) for v in (joint.screw.s, joint.screw.s0)),
+                *map(figure, (joint.screw.pitch, joint.lower, joint.upper)),
+            ]
+            for joint in self.joints
+        ]
+        head = ["joint", "parent", "child", "type", "s", "s0 [m]", "pitch [m/rad]", "lower", "upper"]
+        return html_table(repr(self).splitlines()[0], head, rows)
 
     @cached_property
     def link_names(self) -> tuple[str, ...]:
@@ -177,7 +196,7 @@ class Robot:
         return tuple(order)
 
     def path_to(self, link: str) -> tuple[int, ...]:
-        """Indices of the joints from the base to a link, in that order."""
+        """Indices of the joints from the base to a link, in that order; none for the base link."""
         path: list[int] = []
         while link != self.base_link:
             i = self.joint_above[link]
@@ -186,26 +205,32 @@ class Robot:
         return tuple(reversed(path))
 
     def link(self, name: str) -> Link:
-        """The link of that name."""
+        """The link of that name; UnknownNameError lists the valid ones."""
         return _named(self.links, name, "link")
 
     def joint(self, name: str) -> Joint:
-        """The joint of that name."""
+        """The joint of that name; UnknownNameError lists the valid ones."""
         return _named(self.joints, name, "joint")
 
     def limb(self, name: str) -> Limb:
-        """The limb of that name, or the limb that bears a tip of that name."""
+        """The limb of that name, or the limb whose tip has that name; UnknownNameError lists the limbs."""
         for limb in self.limbs:
             if limb.tip == name:
                 return limb
         return _named(self.limbs, name, "limb")
 
     def posture(self, name: str) -> Posture:
-        """The posture of that name."""
+        """The posture of that name; UnknownNameError lists the valid ones."""
         return _named(self.postures, name, "posture")
 
     def frame(self, name: str) -> tuple[str, Pose]:
         """Link and zero pose of a frame: ``base``, a link or a tip.
+
+        Args:
+            name: of the frame.
+
+        Returns:
+            The link that it is fixed to, and its pose in base axes, translation in [m].
 
         Raises:
             UnknownNameError: no such frame.
@@ -221,12 +246,20 @@ class Robot:
         raise UnknownNameError("frame", name, ("base", *self.tip_names, *self.link_names))
 
     def with_inertia_floor(self, mass: float = 1e-6, inertia: float = 1e-6) -> Robot:
-        """The robot with every link at least so heavy: what simulators need for massless brackets."""
+        """The robot with every link at least so heavy: what simulators need for massless brackets.
+
+        Args:
+            mass: least mass of a link [kg].
+            inertia: least moment of inertia about each base axis, through the link's CoM [kg m^2].
+        """
 
         def raised(link: Link) -> Link:
             i = link.inertia
-            floor = Inertia(max(i.xx, inertia), max(i.yy, inertia), max(i.zz, inertia), i.xy, i.xz, i.yz)
-            return replace(link, mass=max(link.mass, mass), inertia=floor)
+            raised = Inertia(max(i.xx, inertia), max(i.yy, inertia), max(i.zz, inertia), i.xy, i.xz, i.yz)
+            if not are_inertias([raised]):  # a sphere added keeps principal moments those of a body
+                more = max(0, inertia - min(i.xx, i.yy, i.zz))
+                raised = Inertia(i.xx + more, i.yy + more, i.zz + more, i.xy, i.xz, i.yz)
+            return replace(link, mass=max(link.mass, mass), inertia=raised)
 
         return replace(self, links=tuple(raised(link) for link in self.links))
 
@@ -236,3 +269,30 @@ def _named(items: tuple[Any, ...], name: str, what: str) -> Any:
         if item.name == name:
             return item
     raise UnknownNameError(what, name, [item.name for item in items])
+
+
+def robot_text(robot: Robot) -> str:
+    """The text of a table that describes exactly this robot: its own, or one written from its records.
+
+    Raises:
+        InputError: the robot holds symbols that its own text does not explain.
+    """
+    return robot.text if robot.text_matches else robot_toml(robot)
+
+
+def refuse_closures(robot: Robot, what: str, instead: str) -> None:
+    """Refuse a robot with closures where only its open tree would be seen.
+
+    Args:
+        robot: any robot.
+        what: the function that sees the open tree only, such as ``"mass_matrix"``.
+        instead: what honours the closures, such as ``"secondary_rates of closed_mechanism(robot)"``.
+
+    Raises:
+        InputError: the robot has closures.
+    """
+    if robot.closures:
+        names = ", ".join(closure.name for closure in robot.closures)
+        raise InputError(
+            f"{robot.name} has closures ({names}), and {what} sees the open tree only; use {instead}"
+        )

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from screwkin.algebra.scalar import Scalar
-from screwkin.errors import Fault
-from screwkin.model.expression import listed, near
+from screwkin.errors import Fault, near
+from screwkin.model.expression import listed
 from screwkin.model.schema import ROWS, TABLES, FrameRow, RobotRow, Row, kind_of, label, read_row
 
 
 @dataclass(frozen=True)
-class Entry:
+class TableEntry:
     """One row: where it stands, what the file says, and the row if it has no fault of its own."""
 
     where: str
@@ -30,12 +30,12 @@ class Entry:
 class Rows:
     """All rows of a table by their key; ``robot`` and ``waist`` stand once, ``waist`` or not at all."""
 
-    robot: Entry
-    waist: Entry | None
-    entries: Mapping[str, tuple[Entry, ...]]
+    robot: TableEntry
+    waist: TableEntry | None
+    entries: Mapping[str, tuple[TableEntry, ...]]
     servos: Mapping[str, Any]
 
-    def __getitem__(self, table: str) -> tuple[Entry, ...]:
+    def __getitem__(self, table: str) -> tuple[TableEntry, ...]:
         return self.entries[table]
 
     def good(self, table: str) -> Iterator[tuple[str, Any]]:
@@ -55,10 +55,10 @@ def read_rows(
     """
     faults = list(_top_faults(data))
 
-    def entry(kind: type[Row], raw: object, where: str) -> Entry:
+    def entry(kind: type[Row], raw: object, where: str) -> TableEntry:
         row, wrong = read_row(kind, raw, where, names, numbers)
         faults.extend(wrong)
-        return Entry(where, raw if isinstance(raw, dict) else {}, row)
+        return TableEntry(where, raw if isinstance(raw, dict) else {}, row)
 
     robot = entry(RobotRow, data.get("robot", {}), "[robot]")
     given = data.get("waist")

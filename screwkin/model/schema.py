@@ -1,6 +1,6 @@
 """The rows of a robot table: which keys they have, and what pydantic's errors mean in our words.
 
-Each row is read by itself, so that every faulty row of a file is found at once.
+Each row is read by itself, so that every faulty row of a file is reported at once.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.se3 import Vector
-from screwkin.errors import Fault
-from screwkin.model.expression import listed, near
-from screwkin.model.robot import JointType, LimbKind
+from screwkin.errors import Fault, near
+from screwkin.model.expression import listed
+from screwkin.model.records import JointType, LimbKind
 from screwkin.model.values import (
     COUPLINGS,
     Chain,
@@ -200,8 +200,8 @@ def read_row(
     try:
         return kind.model_validate(row, context=(names, numbers)), []
     except ValidationError as error:
-        told = [_fault(kind, where, dict(one)) for one in error.errors(include_url=False)]
-        return None, [fault for fault in told if fault is not None]
+        faults = [_fault(kind, where, dict(one)) for one in error.errors(include_url=False)]
+        return None, [fault for fault in faults if fault is not None]
 
 
 def _fault(kind: type[Row], where: str, error: Mapping[str, Any]) -> Fault | None:

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from screwkin.algebra.pytrees import pytree
+from screwkin.errors import expect
 from screwkin.model.robot import Robot
 
 RIGID = 1e-6
@@ -15,11 +17,31 @@ RIGID = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
+@pytree()
 class State:
-    """T_world_base (..., 4, 4) and q (..., n) [rad or m] in table order; NumPy or JAX arrays."""
+    """The configuration of a robot; a JAX pytree.
+
+    Attributes:
+        T_world_base: pose of the base (..., 4, 4), translation in [m].
+        q: joint positions (..., n) [rad or m], in table order.
+
+    Example:
+        >>> import numpy as np, screwkin as sk
+        >>> sk.State(np.eye(4), np.zeros(3))
+        State: base at (0, 0, 0) m, q = (0, 0, 0)
+        >>> sk.State(np.eye(4), np.zeros((100, 3)))
+        State: T_world_base (4, 4), q (100, 3)
+    """
 
     T_world_base: Any
     q: Any
+
+    def __repr__(self) -> str:
+        T, q = self.T_world_base, self.q
+        if not isinstance(T, np.ndarray) or not isinstance(q, np.ndarray) or T.shape != (4, 4) or q.ndim != 1:
+            return f"State: T_world_base {np.shape(T)}, q {np.shape(q)}"
+        place, joints = (", ".join(f"{x + 0.0:.4g}" for x in values) for values in (T[:3, 3], q))
+        return f"State: base at ({place}) m, q = ({joints})"
 
 
 def not_rigid(T: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -33,9 +55,24 @@ def not_rigid(T: NDArray[np.float64]) -> NDArray[np.bool_]:
 def home(robot: Robot, posture: str = "home") -> State:
     """A named posture of the table: base upright over the world origin, at the posture's height.
 
+    Args:
+        robot: of n joints.
+        posture: name of one of its postures.
+
+    Returns:
+        State of one sample: T_world_base (4, 4), translation in [m]; q (n,) [rad or m].
+
     Raises:
         UnknownNameError: the table has no such posture.
+        InputError: not a robot.
+
+    Example:
+        >>> import screwkin as sk
+        >>> robot = sk.load_robot("linkages/four-bar")
+        >>> sk.home(robot).q.shape
+        (4,)
     """
+    expect(robot, Robot, "robot", 'load_robot("NAME")')
     chosen = robot.posture(posture)
     T = np.eye(4)
     T[2, 3] = chosen.base_height

@@ -1,6 +1,6 @@
 """Names and connections of a robot table: one tree of links, every name known and unique.
 
-Works on the names alone, so that a row with a wrong number is not also told to be missing.
+Works on the names alone, so that a row with a wrong number is not reported as missing too.
 """
 
 from __future__ import annotations
@@ -9,13 +9,13 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from screwkin.errors import Fault
-from screwkin.model.expression import listed, near
+from screwkin.errors import Fault, near
+from screwkin.model.expression import listed
 from screwkin.model.mirror import closes_within, is_sided, limb_part, swapped
-from screwkin.model.rows import Entry, Rows
+from screwkin.model.rows import Rows, TableEntry
 
 RESERVED = ("base", "waist", "floor", "world")
-"""Frames and chains of every mechanism; no tip may bear such a name."""
+"""Frames and chains of every mechanism; no tip may have such a name."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Mirrored:
 
 
 class Named(NamedTuple):
-    """A name, what bears it, and where the file says so."""
+    """A name, what has it, and where the file says so."""
 
     kind: str
     name: str
@@ -81,11 +81,11 @@ def mirrored_limbs(rows: Rows) -> tuple[list[Mirrored], list[Fault]]:
     return found, faults
 
 
-def _is_mirror(entry: Entry) -> bool:
+def _is_mirror(entry: TableEntry) -> bool:
     return "mirror" in entry.raw or "of" in entry.raw
 
 
-def _sideless(rows: Rows, entry: Entry, source: Entry, part: tuple[str, ...]) -> Iterator[Fault]:
+def _sideless(rows: Rows, entry: TableEntry, source: TableEntry, part: tuple[str, ...]) -> Iterator[Fault]:
     """Everything that is reflected needs right or left in its name, to have another one."""
     joints = [e.text("name") for e in rows["joint"] if e.text("child") in part]
     fix = "Put right or left into its name, as in right_knee"
@@ -142,7 +142,7 @@ def _duplicates(named: list[Named], base: str) -> Iterator[Fault]:
             fix = 'Rename it: frame "base" is the base link\'s'
             yield Fault(where, key, "link 'base' is not base_link", fix)
         if kind == "tip" and name in links:
-            yield Fault(where, key, f"tip {name!r} bears the name of a link", "Rename the tip or the link")
+            yield Fault(where, key, f"tip {name!r} has the name of a link", "Rename the tip or the link")
         if kind == "tip" and name in RESERVED:
             yield Fault(where, key, f"tip {name!r} is a reserved name", f"Not allowed: {listed(RESERVED)}")
 
@@ -162,7 +162,7 @@ def _unknown(rows: Rows, named: list[Named]) -> Iterator[Fault]:
 
 def _tree_faults(rows: Rows) -> Iterator[Fault]:
     """Every link but the base hangs by exactly one joint from the base."""
-    base, by = rows.robot.text("base_link"), dict[str, Entry]()
+    base, by = rows.robot.text("base_link"), dict[str, TableEntry]()
     for entry in rows["joint"]:
         child = entry.text("child")
         if child and child == base:
@@ -175,11 +175,11 @@ def _tree_faults(rows: Rows) -> Iterator[Fault]:
     links = {entry.text("name"): entry for entry in rows["link"]}
     complete = all(entry.text("parent") and entry.text("child") for entry in rows["joint"])
     if base not in links or not complete:
-        return  # told already; what follows would only echo it
+        return  # reported already; what follows would only echo it
     yield from _unreached(links, {child: joint for child, joint in by.items() if child != base}, base)
 
 
-def _unreached(links: dict[str, Entry], by: dict[str, Entry], base: str) -> Iterator[Fault]:
+def _unreached(links: dict[str, TableEntry], by: dict[str, TableEntry], base: str) -> Iterator[Fault]:
     in_circle: set[str] = set()
     for name, entry in links.items():
         if name and name != base and name not in by:

@@ -1,41 +1,72 @@
-"""Robot tables: from the text of a TOML file to a checked, evaluated ``Robot``, or to all its faults."""
+"""Robots from files and texts of every format: screw tables, URDF, Denavit-Hartenberg tables."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+import warnings
 from pathlib import Path
 
-from screwkin.algebra.scalar import Scalar
-from screwkin.errors import Fault, TableError
-from screwkin.model.build import all_joints, own_joints, robot_from_rows
-from screwkin.model.checks import row_faults
-from screwkin.model.expression import listed, near, resolve_parameters
+from screwkin.errors import InputError, TableError, expect
 from screwkin.model.library import find_robot
-from screwkin.model.mirror import turns_around
-from screwkin.model.robot import Joint, Robot
-from screwkin.model.rows import Rows, parameters_of, read_rows
-from screwkin.model.structure import joint_names, mirrored_limbs, structure_faults
-from screwkin.model.toml import read_text, read_toml
+from screwkin.model.robot import Robot
+from screwkin.model.toml import read_text
 
 
 def load_robot(name_or_path: str | Path, symbolic: bool = False) -> Robot:
-    """The robot of a bundled name or of a table's path.
+    """The robot of a bundled name, or of a file's path: ``.toml``, ``.urdf``, or a DH ``.csv``.
+
+    What a URDF file says and a table cannot is a warning; ``model.urdf_in.load_urdf`` returns these remarks.
 
     Args:
         name_or_path: such as ``"linkages/four-bar"`` or ``"my/robot.toml"``.
-        symbolic: keep the table's parameters as sympy symbols.
+        symbolic: keep the table's parameters as sympy symbols; for a ``.toml`` only.
+
+    Returns:
+        The checked robot, every length in [m], mass in [kg], angle in [rad].
 
     Raises:
         UnknownNameError: no such robot or file; it lists the bundled names.
         TableError: the file cannot be read or has faults; it lists all of them.
+        InputError: not a name or a path.
+
+    Example:
+        >>> import screwkin as sk
+        >>> sk.load_robot("linkages/four-bar").joint_names
+        ('crank', 'crank_pin', 'rocker_pin', 'rocker')
     """
+    expect(name_or_path, (str, Path), "name_or_path", "a bundled robot's name or the path of a file")
     path = find_robot(name_or_path)
-    return parse_robot(read_text(path, TableError), str(path), symbolic)
+    if path.suffix.lower() == ".csv":
+        from screwkin.model.dh_csv import load_dh
+        from screwkin.model.dh_robot import robot_from_dh
+
+        _only_numbers(symbolic, str(path), "a DH table")
+        return robot_from_dh(load_dh(path), path.stem, str(path))
+    return _read(read_text(path, TableError), str(path), symbolic)
+
+
+def robot_from_text(text: str, name: str = "<text>", symbolic: bool = False) -> Robot:
+    """The robot of a text: a screw table in TOML, or URDF, which begins with ``<``.
+
+    Args:
+        text: the content of such a file.
+        name: where it comes from, for messages and for ``Robot.path``.
+        symbolic: keep the table's parameters as sympy symbols; for TOML only.
+
+    Raises:
+        TableError: the text has faults; it lists all of them.
+        InputError: not a text, or symbols asked of URDF.
+
+    Example:
+        >>> import screwkin as sk
+        >>> robot_from_text(sk.load_robot("linkages/four-bar").text).name
+        'four-bar'
+    """
+    expect(text, str, "text", "the content of a robot's file, or call load_robot with its path")
+    return _read(text, name, symbolic)
 
 
 def parse_robot(text: str, path: str = "<text>", symbolic: bool = False) -> Robot:
-    """The robot of a table's text.
+    """The robot of a table's text in TOML.
 
     Args:
         text: TOML; the comments of the bundled tables explain its keys.
@@ -46,43 +77,23 @@ def parse_robot(text: str, path: str = "<text>", symbolic: bool = False) -> Robo
     Raises:
         TableError: the text has faults; it lists all of them.
     """
-    data = read_toml(text, path, TableError)
-    numbers, faults = resolve_parameters(parameters_of(data))
-    rows, more = read_rows(data, numbers, numbers)
-    mirrored, wrong = mirrored_limbs(rows)
-    faults += [*more, *wrong, *row_faults(rows), *structure_faults(rows, mirrored)]
-    around = {joint.name for joint in own_joints(rows) if turns_around(joint)}
-    joints = all_joints(rows, mirrored, around)
-    faults += _posture_faults(rows, joints, joint_names(rows, mirrored))
-    if faults:
-        raise TableError(path, faults)
-    names: Mapping[str, Scalar] = numbers
+    return Robot.from_text(text, path, symbolic)
+
+
+def _read(text: str, name: str, symbolic: bool) -> Robot:
+    """The robot of a text in TOML or XML; warns its caller's caller of what URDF leaves open."""
+    if not text.lstrip("\ufeff \t\r\n").startswith("<"):
+        return parse_robot(text, name, symbolic)
+    from screwkin.model.urdf_in import parse_urdf
+
+    _only_numbers(symbolic, name, "URDF")
+    read = parse_urdf(text, name)
+    warnings.warn(f"{name}: {'; '.join(read.remarks)}", stacklevel=3)
+    return read.robot
+
+
+def _only_numbers(symbolic: bool, name: str, what: str) -> None:
     if symbolic:
-        names, _ = resolve_parameters(parameters_of(data), symbolic=True)
-        rows, _ = read_rows(data, names, numbers)
-        joints = all_joints(rows, mirrored, around)
-    return replace(robot_from_rows(rows, joints, mirrored), parameters=dict(names), text=text, path=path)
-
-
-def _posture_faults(rows: Rows, joints: Sequence[Joint], known: Sequence[str]) -> Iterator[Fault]:
-    """Postures name known joints within their limits; a floating base has a height."""
-    floating = rows.robot.raw.get("base") == "floating"
-    for where, row in rows.good("posture"):
-        if floating and row.base_height is None:
-            fix = "Write the height of the base above the floor in m"
-            yield Fault(where, "base_height", "is missing", fix)
-        for name in row.q:
-            if name not in known:
-                fix = f"{near(name, known)}Joints: {listed(known)}"
-                yield Fault(where, f"q.{name}", f"there is no joint {name!r}", fix)
-        for joint in joints:
-            if joint.lower <= joint.upper:  # else told already
-                yield from _limit_faults(where, joint, row.q)
-
-
-def _limit_faults(where: str, joint: Joint, q: Mapping[str, float]) -> Iterator[Fault]:
-    value, margin = float(q.get(joint.name, 0.0)), 1e-9  # a posture may lie on a limit, up to rounding
-    if not joint.lower - margin <= value <= joint.upper + margin:
-        left_out = "" if joint.name in q else ", where joints left out are"
-        found = f"{value:.6g}{left_out} lies outside [{joint.lower:.6g}, {joint.upper:.6g}]"
-        yield Fault(where, f"q.{joint.name}", found, f"Write a position between the limits of {joint.name!r}")
+        raise InputError(
+            f"{name}: {what} has no parameters to keep as symbols; convert it to a .toml and name them"
+        )

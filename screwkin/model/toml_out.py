@@ -1,6 +1,6 @@
 """A robot written as a table: the text reads back to the same robot, number for number.
 
-Formulas and mirrored limbs are written out, as numbers and rows of their own: parameters are not kept.
+Formulas and mirrored limbs are written out, as numbers and rows of their own: parameters are not written.
 """
 
 from __future__ import annotations
@@ -10,21 +10,29 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from screwkin.algebra.scalar import Scalar, is_symbolic
+from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.se3 import UNTURNED, ZERO, Pose, Rotation, Vector, leaves
 from screwkin.errors import InputError
-from screwkin.model.robot import Closure, Joint, Limb, Link, Robot, Sole
+from screwkin.model.records import Closure, Joint, Limb, Link, Posture, RobotRecord, Sole, open_scalars
 from screwkin.model.values import COUPLINGS
 
+_UNLIMITED = {"lower": -math.inf, "upper": math.inf, "velocity": math.inf, "effort": math.inf}
 _GIMBAL = 1e-9  # cosine of the pitch below which roll and yaw turn about the same axis
 
 
-def robot_toml(robot: Robot) -> str:
+def robot_toml(robot: RobotRecord) -> str:
     """The text of a table for a robot of numbers.
 
     Raises:
         InputError: the robot holds symbols.
     """
+    for x in open_scalars(robot):
+        raise InputError(f"the robot holds the symbol {x}; load it with numbers to write it")
+    return table_text(table_data(robot))
+
+
+def table_data(robot: RobotRecord) -> dict[str, Any]:
+    """The table of a robot as nested dictionaries, as a TOML reader would return them."""
     head = {
         "name": robot.name,
         "description": robot.description,
@@ -33,21 +41,32 @@ def robot_toml(robot: Robot) -> str:
         "base": robot.base,
     }
     origins = {joint.child: joint.screw.s0 for joint in robot.joints}
-    blocks = [_block("[robot]", {key: value for key, value in head.items() if value})]
-    blocks += [_block("[[link]]", _link(link, origins.get(link.name, ZERO))) for link in robot.links]
-    blocks += [_block("[[joint]]", _joint(joint)) for joint in robot.joints]
-    blocks += [_block("[[closure]]", _closure(closure)) for closure in robot.closures]
-    blocks += [_block("[[limb]]", _limb(limb)) for limb in robot.limbs]
-    blocks += [_block("[[sole]]", _sole(sole)) for sole in robot.soles]
-    if robot.waist is not None:
-        blocks.append(_block("[waist]", _frame(robot.waist)))
-    for posture in robot.postures:
-        q = {name: value for name, value in zip(robot.joint_names, posture.q, strict=True) if value}
-        blocks.append(
-            _block("[[posture]]", {"name": posture.name, "base_height": posture.base_height, "q": q})
-        )
-    if robot.servos:
-        blocks.append(_block("[servos]", robot.servos))
+    data: dict[str, Any] = {
+        "robot": {key: value for key, value in head.items() if value},
+        "link": [_link(link, origins.get(link.name, ZERO)) for link in robot.links],
+        "joint": [_joint(joint) for joint in robot.joints],
+        "closure": [_closure(closure) for closure in robot.closures],
+        "limb": [_limb(limb) for limb in robot.limbs],
+        "sole": [_sole(sole) for sole in robot.soles],
+        "waist": {} if robot.waist is None else _frame(robot.waist),
+        "posture": [_posture(posture, robot) for posture in robot.postures],
+        "servos": dict(robot.servos),
+    }
+    return {key: value for key, value in data.items() if value}
+
+
+def table_text(data: Mapping[str, Any]) -> str:
+    """TOML text of a table's nested dictionaries: a block for every row, what lies within it inline."""
+    loose = {
+        key: value for key, value in data.items() if not isinstance(value, Mapping) and not _are_rows(value)
+    }
+    blocks = [_block("", loose)] if loose else []
+    for key, value in data.items():
+        if key in loose:
+            continue
+        rows = value if isinstance(value, list) else [value]
+        title = f"[[{toml_key(key)}]]" if isinstance(value, list) else f"[{toml_key(key)}]"
+        blocks += [_block(title, row) for row in rows]
     return "\n".join(blocks)
 
 
@@ -61,22 +80,29 @@ def rpy_of(R: Rotation) -> tuple[float, float, float]:
     return math.atan2(y[2], z[2]), pitch, math.atan2(x[1], x[0])
 
 
+def _are_rows(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(row, Mapping) for row in value)
+
+
 def _block(title: str, values: Mapping[str, Any]) -> str:
-    return "\n".join([title, *(f"{_key(key)} = {_value(value)}" for key, value in values.items())]) + "\n"
+    return (
+        "\n".join([title, *(f"{toml_key(key)} = {toml_value(value)}" for key, value in values.items())])
+        + "\n"
+    )
 
 
 def _link(link: Link, origin: Vector) -> dict[str, Any]:
     row: dict[str, Any] = {"name": link.name, "mass": link.mass}
-    if link.mass:
-        row["com"] = link.com
+    if link.mass or leaves(link.com) != leaves(link.frame.p):
+        row["com"] = _vector(link.com)
     i = link.inertia
     moments = {"xx": i.xx, "yy": i.yy, "zz": i.zz, "xy": i.xy, "xz": i.xz, "yz": i.yz}
     if link.mass or any(moments.values()):
         row["inertia"] = {name: x for name, x in moments.items() if x or name in ("xx", "yy", "zz")}
     if leaves(link.frame) != leaves(Pose(UNTURNED, origin)):
-        row["frame"] = link.frame
+        row["frame"] = _frame(link.frame)
     if link.boxes:
-        row["boxes"] = [{"center": box.center, "size": box.size} for box in link.boxes]
+        row["boxes"] = [{"center": _vector(box.center), "size": _vector(box.size)} for box in link.boxes]
     return row
 
 
@@ -87,70 +113,76 @@ def _joint(joint: Joint) -> dict[str, Any]:
         "parent": joint.parent,
         "child": joint.child,
         "type": joint.type,
-        "s": screw.s,
-        "s0": screw.s0,
+        "s": _vector(screw.s),
+        "s0": _vector(screw.s0),
     }
-    if joint.type == "helical":
+    if joint.type == "helical" or (joint.type == "revolute" and screw.pitch != 0):
         row["pitch"] = screw.pitch
-    limits = {"lower": joint.lower, "upper": joint.upper, "velocity": joint.velocity, "effort": joint.effort}
-    return {**row, **{key: x for key, x in limits.items() if math.isfinite(x)}}
+    limits = {key: getattr(joint, key) for key in _UNLIMITED}
+    return {**row, **{key: x for key, x in limits.items() if x != _UNLIMITED[key]}}
 
 
 def _closure(closure: Closure) -> dict[str, Any]:
     return {
         "name": closure.name,
         "link_a": closure.link_a,
-        "frame_a": closure.frame_a,
+        "frame_a": _frame(closure.frame_a),
         "link_b": closure.link_b,
-        "frame_b": closure.frame_b,
+        "frame_b": _frame(closure.frame_b),
     }
 
 
 def _limb(limb: Limb) -> dict[str, Any]:
     row: dict[str, Any] = {"name": limb.name, "kind": limb.kind, "link": limb.link, "tip": limb.tip}
-    row["frame"] = limb.frame
+    row["frame"] = _frame(limb.frame)
     if limb.chain != COUPLINGS:
-        row["chain"] = limb.chain
+        row["chain"] = list(limb.chain)
     return row
 
 
 def _sole(sole: Sole) -> dict[str, Any]:
-    return {"limb": sole.limb, "corners": sole.corners}
+    return {"limb": sole.limb, "corners": [_vector(corner) for corner in sole.corners]}
+
+
+def _posture(posture: Posture, robot: RobotRecord) -> dict[str, Any]:
+    q = {joint.name: value for joint, value in zip(robot.joints, posture.q, strict=True) if value}
+    return {"name": posture.name, "base_height": posture.base_height, "q": q}
+
+
+def _vector(v: Vector) -> list[Scalar]:
+    return list(v)
 
 
 def _frame(pose: Pose) -> dict[str, Any]:
     turned = leaves(pose.R) != leaves(UNTURNED)
-    return {"xyz": pose.p, **({"rpy": rpy_of(pose.R)} if turned else {})}
+    return {"xyz": _vector(pose.p), **({"rpy": list(rpy_of(pose.R))} if turned else {})}
 
 
-def _value(value: Any) -> str:
+def toml_value(value: Any) -> str:
     """A value as TOML, tables inline."""
-    if isinstance(value, Pose):
-        return _value(_frame(value))
     if isinstance(value, Mapping):
         return "{ " + ", ".join(_pairs(value)) + " }" if value else "{}"
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, Vector | Sequence):
-        return "[" + ", ".join(map(_value, value)) + "]"
+    if isinstance(value, Sequence):
+        return "[" + ", ".join(map(toml_value, value)) + "]"
     if hasattr(value, "isoformat"):  # a date or time of [servos]
         return str(value.isoformat())
     return _number(value)
 
 
 def _pairs(table: Mapping[str, Any]) -> Iterator[str]:
-    return (f"{_key(key)} = {_value(value)}" for key, value in table.items())
+    return (f"{toml_key(key)} = {toml_value(value)}" for key, value in table.items())
 
 
-def _key(key: str) -> str:
+def toml_key(key: str) -> str:
+    """A key as TOML, in quotes where it must be."""
     plain = key.replace("_", "").replace("-", "")
-    return key if plain.isascii() and plain.isalnum() else _value(key)
+    return key if plain.isascii() and plain.isalnum() else toml_value(key)
 
 
 def _number(x: Scalar) -> str:
     """Shortest text that reads back to the same number; no negative zero."""
-    if is_symbolic(x):
-        raise InputError(f"the robot holds the symbol {x}; load it with numbers to write it")
     return str(x) if isinstance(x, int) else repr(float(x) + 0.0)

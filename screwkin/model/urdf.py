@@ -2,7 +2,7 @@
 
 Every URDF link frame is parallel to the base in the zero pose, with its origin at its joint's ``s0``: a URDF
 joint axis must pass through the origin of its child's frame, which a frame given in the table need not do.
-``urdf_frames`` tells where these frames are, so that poses can be carried over. All other numbers are the
+``urdf_frames`` says where these frames are, so that poses can be carried over. All other numbers are the
 table's own, shifted to that origin and written with every digit that distinguishes a float.
 """
 
@@ -50,6 +50,9 @@ def urdf_from_robot(robot: Robot) -> str:
 
     Simulators need masses above zero on every link: give them ``robot.with_inertia_floor()``. Tips, soles and
     postures have no place in URDF; a fixed base is the reader's choice.
+
+    Args:
+        robot: of numbers.
 
     Raises:
         InputError: the robot has helical joints or closures, which URDF cannot say; all are named.

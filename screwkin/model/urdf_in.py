@@ -1,8 +1,8 @@
-"""A robot read from URDF: its tree told in one frame, the base link's, in the zero pose.
+"""A robot read from URDF: its tree expressed in one frame, the base link's, in the zero pose.
 
-Fixed joints merge their bodies; collision boxes along the base axes are kept. URDF knows no limbs, soles or
-postures, so these are for the reader of the result to add. Whatever cannot be kept is told, never dropped
-silently. XML with entities or external references is refused.
+Fixed joints merge their bodies; collision boxes along the base axes stay. URDF knows no limbs, soles or
+postures, so these are for the reader of the result to add. Whatever a table cannot hold is a remark, never
+dropped silently. XML with entities or external references is refused.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.screws import INFINITE, Screw
 from screwkin.algebra.se3 import IDENTITY, Pose, Vector, as_array, vector_from_array
 from screwkin.errors import TableError
-from screwkin.model.robot import Box, Inertia, Joint, Link, Robot
-from screwkin.model.table import parse_robot
+from screwkin.model.records import Box, Inertia, Joint, Link, RobotRecord
+from screwkin.model.robot import Robot
 from screwkin.model.toml import read_text
 from screwkin.model.toml_out import robot_toml
 from screwkin.model.urdf_xml import TYPES, Edge, Element, Reader, base_of, named, read_joints, read_root
@@ -40,7 +40,10 @@ class UrdfRobot:
 
 
 def load_urdf(path: str | Path) -> UrdfRobot:
-    """The robot of a URDF file.
+    """The robot of a URDF file, with remarks on what a table cannot hold.
+
+    Args:
+        path: of the file.
 
     Raises:
         TableError: the file cannot be read or has faults; it lists all of them.
@@ -50,6 +53,10 @@ def load_urdf(path: str | Path) -> UrdfRobot:
 
 def parse_urdf(text: str, path: str = "<text>") -> UrdfRobot:
     """The robot of a URDF text; its base is fixed if the root link is called ``world``, else floating.
+
+    Args:
+        text: XML.
+        path: where it comes from, for messages and for ``Robot.path``.
 
     Raises:
         TableError: the text has faults; it lists all of them.
@@ -68,7 +75,7 @@ def parse_urdf(text: str, path: str = "<text>") -> UrdfRobot:
     bodies, moving = _bodies(reader, base, links, joints, names)
     rows = [_joint(reader, edge, pose, parent, child) for edge, pose, parent, child in moving]
     parts = [_link(body) for body in bodies]
-    robot = Robot(
+    robot = RobotRecord(
         name=_name(root.get("name", "") or "robot"),
         description="",
         source=f"URDF {Path(path).name}",
@@ -80,7 +87,7 @@ def parse_urdf(text: str, path: str = "<text>") -> UrdfRobot:
     if reader.faults:
         raise TableError(path, reader.faults)
     reader.remarks.append("URDF names no limbs, soles and postures: add those that the robot has")
-    return UrdfRobot(parse_robot(robot_toml(robot), path), tuple(dict.fromkeys(reader.remarks)))
+    return UrdfRobot(Robot.from_text(robot_toml(robot), path), tuple(dict.fromkeys(reader.remarks)))
 
 
 @dataclass

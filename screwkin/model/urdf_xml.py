@@ -10,7 +10,7 @@ from typing import Any
 from screwkin.algebra.scalar import structural
 from screwkin.algebra.se3 import Pose, Vector, X, Y, Z, rotate
 from screwkin.errors import Fault, TableError
-from screwkin.model.robot import JointType
+from screwkin.model.records import JointType
 
 Element = Any
 

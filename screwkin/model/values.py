@@ -24,7 +24,8 @@ UNIT_TOLERANCE = 1e-9
 COUPLINGS = ("px", "py", "pz", "rx", "ry", "rz")
 """Couplings of a virtual chain: translations along and rotations about x, y, z."""
 
-_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
+NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
+"""What the name of a link, joint, limb or posture looks like."""
 
 
 def _wrong(found: str, fix: str, unresolved: bool = False) -> PydanticCustomError:
@@ -69,8 +70,8 @@ def _unit(value: object, info: ValidationInfo) -> Vector:
         raise _wrong("s is the zero vector", "Write the unit vector of the joint's axis")
     if abs(length - 1) > UNIT_TOLERANCE:
         normalised = ", ".join(f"{c / length:.10g}" for c in axis)
-        told = ", ".join(f"{c:g}" for c in axis)
-        raise _wrong(f"({told}) has norm {length:.10g}, expected 1", f"Write s = [{normalised}]")
+        given = ", ".join(f"{c:g}" for c in axis)
+        raise _wrong(f"({given}) has norm {length:.10g}, expected 1", f"Write s = [{normalised}]")
     return axis
 
 
@@ -96,7 +97,7 @@ def _positive(value: object, info: ValidationInfo) -> float:
 
 
 def _name(value: object) -> str:
-    if not isinstance(value, str) or not _NAME.fullmatch(value):
+    if not isinstance(value, str) or not NAME.fullmatch(value):
         fix = "Write letters, digits, _ and -, beginning with a letter"
         raise _wrong(f"{value!r} is not a name", fix)
     return value

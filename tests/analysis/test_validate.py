@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import json
+import pickle
 from dataclasses import replace
 from typing import Any
 
@@ -227,3 +229,9 @@ def test_what_cannot_balance_falls(robot: Robot, gait: str, settings: dict[str, 
     check = validate(robot, sk.walk(robot, sk.load_gait(gait).replace(**settings), steps=8))
     assert check.fell
     assert not check.passed
+
+
+def test_a_verdict_survives_pickles_and_copies(check: Validation) -> None:
+    for other in (pickle.loads(pickle.dumps(check)), copy.deepcopy(check)):  # noqa: S301
+        assert other.to_dict() == check.to_dict()
+        np.testing.assert_array_equal(other.run.q, check.run.q)

@@ -171,7 +171,9 @@ def test_even_a_straight_guess_leads_to_a_bent_posture(bioloid):
 
 def limited(robot, name, lower, upper):
     joints = tuple(replace(j, lower=lower, upper=upper) if j.name == name else j for j in robot.joints)
-    return replace(robot, joints=joints)
+    i = robot.joint_names.index(name)
+    postures = tuple(posture for posture in robot.postures if lower <= posture.q[i] <= upper)
+    return replace(robot, joints=joints, postures=postures)
 
 
 def test_a_joint_beyond_its_limits_is_named_with_position_and_limits(bioloid):

@@ -47,7 +47,9 @@ def test_an_unknown_name_lists_the_valid_ones(package):
     plant(package / "robots", "alpha", "linkages/four-bar")
     with pytest.raises(UnknownNameError) as caught:
         library.find_robot("aleph")
-    assert str(caught.value) == "unknown robot 'aleph'; valid: alpha, linkages/four-bar"
+    assert (
+        str(caught.value) == "unknown robot 'aleph'; valid: alpha, linkages/four-bar. Did you mean 'alpha'?"
+    )
     assert caught.value.exit_code == 2
     with pytest.raises(UnknownNameError, match="unknown gait 'trot'; valid: none"):
         library.find_gait("trot")

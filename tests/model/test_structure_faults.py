@@ -77,7 +77,7 @@ def test_a_mirrored_name_that_exists_already_is_told_at_the_mirrored_limb():
 
 def test_a_tip_that_bears_the_name_of_a_link_is_told():
     fault = faults_of(changed('tip = "right_foot"', 'tip = "right_shin"'))[0]
-    assert (fault.key, fault.found) == ("tip", "tip 'right_shin' bears the name of a link")
+    assert (fault.key, fault.found) == ("tip", "tip 'right_shin' has the name of a link")
 
 
 def test_a_reserved_tip_is_told():

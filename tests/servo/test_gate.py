@@ -162,7 +162,7 @@ def test_registers_that_lie_elsewhere_are_found():
 
 def test_a_joint_whose_limits_its_servo_cannot_reach_is_refused():
     servos = {**BIOLOID.servos, "zero": {"right_knee": 3.0}}
-    robot = narrow(replace(BIOLOID, servos=servos), lower=0.1, upper=0.2)
+    robot = narrow(replace(BIOLOID, servos=servos, postures=()), lower=0.1, upper=0.2)
     with pytest.raises(SafetyError, match="outside the range of servo"):
         Bounds.of(replace(robot, servos={**servos, "direction": {}}))
 

@@ -1,0 +1,105 @@
+"""Tables read: from the text of a TOML file to the records of a robot, or to all its faults."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from screwkin.algebra.scalar import Scalar
+from screwkin.errors import Fault, TableError, near
+from screwkin.model.build import all_joints, own_joints, robot_from_rows
+from screwkin.model.checks import row_faults
+from screwkin.model.expression import listed, resolve_parameters
+from screwkin.model.mirror import turns_around
+from screwkin.model.records import Joint, RobotRecord
+from screwkin.model.rows import Rows, parameters_of, read_rows
+from screwkin.model.structure import Mirrored, joint_names, mirrored_limbs, structure_faults
+from screwkin.model.toml import read_toml
+
+
+@dataclass(frozen=True)
+class CheckedTable:
+    """A table's rows with numbers for their parameters, and everything that is wrong with them.
+
+    Attributes:
+        numbers: values of the parameters; None for a faulty one.
+        rows: all rows.
+        mirrored: limbs declared by reflection.
+        around: names of the joints whose mirrored position changes sign.
+        structural: faults of names and connections.
+        faults: all faults, the structural ones among them.
+    """
+
+    numbers: Mapping[str, Scalar]
+    rows: Rows
+    mirrored: Sequence[Mirrored]
+    around: frozenset[str]
+    structural: Sequence[Fault]
+    faults: Sequence[Fault]
+
+
+def checked_table(data: Mapping[str, Any]) -> CheckedTable:
+    """The rows of a table and their faults.
+
+    Args:
+        data: the nested dictionaries of a TOML file.
+    """
+    numbers, faults = resolve_parameters(parameters_of(data))
+    rows, more = read_rows(data, numbers, numbers)
+    mirrored, wrong = mirrored_limbs(rows)
+    structural = [*wrong, *structure_faults(rows, mirrored)]
+    faults += [*more, *wrong, *row_faults(rows), *structural[len(wrong) :]]
+    around = frozenset(joint.name for joint in own_joints(rows) if turns_around(joint))
+    joints = all_joints(rows, mirrored, around)
+    faults += _posture_faults(rows, joints, joint_names(rows, mirrored))
+    return CheckedTable(numbers, rows, mirrored, around, structural, faults)
+
+
+def read_table(text: str, path: str, symbolic: bool = False) -> RobotRecord:
+    """The records of a table's text.
+
+    Args:
+        text: TOML; the comments of the bundled tables explain its keys.
+        path: where it comes from, for messages and for ``RobotRecord.path``.
+        symbolic: keep the table's parameters as real sympy symbols of the same names wherever they are used
+            in screws, frames, masses, inertias, boxes and soles; limits and postures stay numbers.
+
+    Raises:
+        TableError: the text has faults; it lists all of them.
+    """
+    data = read_toml(text, path, TableError)
+    table = checked_table(data)
+    if table.faults:
+        raise TableError(path, table.faults)
+    names, rows = table.numbers, table.rows
+    if symbolic:
+        names, _ = resolve_parameters(parameters_of(data), symbolic=True)
+        rows, _ = read_rows(data, names, table.numbers)
+    joints = all_joints(rows, table.mirrored, table.around)
+    record = robot_from_rows(rows, joints, table.mirrored)
+    return replace(record, parameters=dict(names), text=text, path=path)
+
+
+def _posture_faults(rows: Rows, joints: Sequence[Joint], known: Sequence[str]) -> Iterator[Fault]:
+    """Postures name known joints within their limits; a floating base has a height."""
+    floating = rows.robot.raw.get("base") == "floating"
+    for where, row in rows.good("posture"):
+        if floating and row.base_height is None:
+            fix = "Write the height of the base above the floor in m"
+            yield Fault(where, "base_height", "is missing", fix)
+        for name in row.q:
+            if name not in known:
+                fix = f"{near(name, known)}Joints: {listed(known)}"
+                yield Fault(where, f"q.{name}", f"there is no joint {name!r}", fix)
+        for joint in joints:
+            if joint.lower <= joint.upper:  # else reported already
+                yield from _limit_faults(where, joint, row.q)
+
+
+def _limit_faults(where: str, joint: Joint, q: Mapping[str, float]) -> Iterator[Fault]:
+    value, margin = float(q.get(joint.name, 0.0)), 1e-9  # a posture may lie on a limit, up to rounding
+    if not joint.lower - margin <= value <= joint.upper + margin:
+        left_out = "" if joint.name in q else ", where joints left out are"
+        found = f"{value:.6g}{left_out} lies outside [{joint.lower:.6g}, {joint.upper:.6g}]"
+        yield Fault(where, f"q.{joint.name}", found, f"Write a position between the limits of {joint.name!r}")

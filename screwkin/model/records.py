@@ -1,0 +1,182 @@
+"""The records of a robot: links, joints, limbs, soles, closures, postures, and all of them together.
+
+Every point, axis, CoM, inertia, box and sole is given in the zero pose (all q = 0), in base axes from the
+base origin. Numbers are scalars: floats as a rule, sympy symbols in the symbolic twin of a table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from screwkin.algebra.scalar import Scalar, is_jax, is_symbolic
+from screwkin.algebra.screws import Screw
+from screwkin.algebra.se3 import Pose, Vector
+
+JointType = Literal["revolute", "prismatic", "helical"]
+LimbKind = Literal["leg", "arm"]
+
+
+@dataclass(frozen=True)
+class Box:
+    """A box with edges along the base axes: centre and edge lengths [m]."""
+
+    center: Vector
+    size: Vector
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """Rotational inertia about the CoM, in base axes [kg m^2]."""
+
+    xx: Scalar
+    yy: Scalar
+    zz: Scalar
+    xy: Scalar = 0
+    xz: Scalar = 0
+    yz: Scalar = 0
+
+    def times(self, w: Vector) -> Vector:
+        """The inertia applied to an angular velocity."""
+        return Vector(
+            w.x * self.xx + w.y * self.xy + w.z * self.xz,
+            w.x * self.xy + w.y * self.yy + w.z * self.yz,
+            w.x * self.xz + w.y * self.yz + w.z * self.zz,
+        )
+
+
+@dataclass(frozen=True)
+class Link:
+    """A rigid body: mass [kg], CoM, inertia, its own frame, and boxes for contact and pictures."""
+
+    name: str
+    mass: Scalar
+    com: Vector
+    inertia: Inertia
+    frame: Pose
+    boxes: tuple[Box, ...] = ()
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A screw joint between two links, with limits in rad (m for prismatic), rad/s and N m."""
+
+    name: str
+    parent: str
+    child: str
+    type: JointType
+    screw: Screw
+    lower: float
+    upper: float
+    velocity: float
+    effort: float
+
+
+@dataclass(frozen=True)
+class Closure:
+    """Two frames on two links that must coincide: it closes a loop of the tree."""
+
+    name: str
+    link_a: str
+    frame_a: Pose
+    link_b: str
+    frame_b: Pose
+
+
+@dataclass(frozen=True)
+class Limb:
+    """A leg or an arm: its tip is a frame on its last link, where its virtual chain is attached."""
+
+    name: str
+    kind: LimbKind
+    link: str
+    tip: str
+    frame: Pose
+    chain: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Sole:
+    """The contact polygon of a leg: corners in the zero pose, counter-clockwise seen from above."""
+
+    limb: str
+    corners: tuple[Vector, ...]
+
+
+@dataclass(frozen=True)
+class Posture:
+    """Named joint positions, and the height of the base above the floor [m]."""
+
+    name: str
+    base_height: float
+    q: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class RobotRecord:
+    """The evaluated content of a robot table, unchecked: what readers build and writers write.
+
+    Attributes:
+        name, description, source: of the robot, and where its numbers come from.
+        base: ``floating``, or ``fixed`` to the world.
+        base_link: name of the link that carries the base frame.
+        links, joints, limbs, soles, closures, postures: in table order; q is in the order of ``joints``.
+        waist: the frame that gaits steer, fixed to the base link, in base axes; None: from the hips.
+        servos: the table ``[servos]``, as it stands.
+        parameters: values of the named parameters: floats, or symbols.
+        text: of the table that it was read from; empty if there is none.
+        path: of that table; empty if there is none.
+    """
+
+    name: str
+    description: str
+    source: str
+    base: Literal["floating", "fixed"]
+    base_link: str
+    links: tuple[Link, ...]
+    joints: tuple[Joint, ...]
+    limbs: tuple[Limb, ...] = ()
+    soles: tuple[Sole, ...] = ()
+    closures: tuple[Closure, ...] = ()
+    postures: tuple[Posture, ...] = ()
+    waist: Pose | None = None
+    servos: Mapping[str, Any] = field(default_factory=dict)
+    parameters: Mapping[str, Scalar] = field(default_factory=dict)
+    text: str = ""
+    path: str = ""
+
+
+def open_scalars(value: Any) -> Iterator[Scalar]:
+    """Components of a record that are no single numbers: symbols, tracers, batches, nodes of a graph."""
+    if is_dataclass(value):
+        for f in fields(value):
+            if f.name not in ("parameters", "servos"):
+                yield from open_scalars(getattr(value, f.name))
+    elif isinstance(value, tuple):
+        for item in value:
+            yield from open_scalars(item)
+    elif is_open(value):
+        yield value
+
+
+def is_open(x: Scalar) -> bool:
+    """True for a scalar that is no single number yet."""
+    if isinstance(x, int | float | str):
+        return False
+    return is_symbolic(x) or is_jax(x) or isinstance(x, np.ndarray) or hasattr(x, "__scalar_namespace__")
+
+
+def same_content(a: RobotRecord, b: RobotRecord) -> bool:
+    """Whether two robots are the same in every field but text, path and the names of parameters."""
+    names = [f.name for f in fields(RobotRecord) if f.name not in ("text", "path", "parameters")]
+    return all(_plain(getattr(a, name)) == _plain(getattr(b, name)) for name in names)
+
+
+def _plain(value: Any) -> Any:
+    """A record as nested tuples, which compare by their numbers."""
+    if is_dataclass(value):
+        return tuple(_plain(getattr(value, f.name)) for f in fields(value))
+    return tuple(map(_plain, value)) if isinstance(value, tuple) else value

@@ -1,0 +1,145 @@
+"""A quick look at a robot's records: almost every robot is certified in a fraction of a millisecond.
+
+Whatever is not certified goes through the checks of a file (``record_faults``), which say what is wrong.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from screwkin.algebra.se3 import Pose, Vector
+from screwkin.model.checks import sole_faults
+from screwkin.model.records import Inertia, Joint, RobotRecord
+from screwkin.model.structure import RESERVED
+from screwkin.model.values import COUPLINGS, NAME, UNIT_TOLERANCE
+
+
+def certified(robot: RobotRecord) -> bool:
+    """True only if every component is a number and the robot has no fault; False proves nothing."""
+    try:
+        return _names_certified(robot) and _numbers_certified(robot)
+    except (TypeError, ValueError, AttributeError, KeyError):
+        return False
+
+
+def _names_certified(robot: RobotRecord) -> bool:
+    links, joints, limbs = robot.links, robot.joints, robot.limbs
+    inner: list[Any] = [link.boxes for link in links] + [sole.corners for sole in robot.soles]
+    inner += [posture.q for posture in robot.postures]
+    if not all(
+        isinstance(rows, tuple)
+        for rows in (links, joints, robot.closures, limbs, robot.soles, robot.postures, *inner)
+    ):
+        return False
+    for rows in (links, joints, robot.closures, limbs, robot.postures):
+        if len({row.name for row in rows}) < len(rows) or not all(NAME.fullmatch(row.name) for row in rows):
+            return False
+    named = {link.name for link in links}
+    tips, legs = {limb.tip for limb in limbs}, {limb.name for limb in limbs if limb.kind == "leg"}
+    soled = {sole.limb for sole in robot.soles}
+    return (
+        bool(NAME.fullmatch(robot.name))
+        and all(isinstance(text, str) for text in (robot.description, robot.source))
+        and robot.base in ("floating", "fixed")
+        and _is_tree(robot.base_link, named, joints)
+        and ("base" not in named or robot.base_link == "base")
+        and all(c.link_a != c.link_b and {c.link_a, c.link_b} <= named for c in robot.closures)
+        and len(tips) == len(limbs)
+        and not tips & {*named, *RESERVED}
+        and all(NAME.fullmatch(tip) for tip in tips)
+        and all(limb.link in named and limb.kind in ("leg", "arm") for limb in limbs)
+        and all(limb.chain and len({*limb.chain} & {*COUPLINGS}) == len(limb.chain) for limb in limbs)
+        and soled <= legs
+        and len(soled) == len(robot.soles)
+        and all(len(posture.q) == len(joints) for posture in robot.postures)
+    )
+
+
+def _is_tree(base: str, links: set[str], joints: Sequence[Joint]) -> bool:
+    """Every link but the base is the child of exactly one joint and hangs, link by link, from the base."""
+    above = {joint.child: joint.parent for joint in joints}
+    if base not in links or {*above, base} != links or len(joints) != len(links) - 1:
+        return False
+    hung = {base}
+    for link in links:
+        path = []
+        while link not in hung:
+            path.append(link)
+            if len(path) > len(links) or above[link] not in links:
+                return False
+            link = above[link]
+        hung.update(path)
+    return True
+
+
+def _numbers_certified(robot: RobotRecord) -> bool:
+    joints, limbs, closures = robot.joints, robot.limbs, robot.closures
+    frames = [link.frame for link in robot.links] + [limb.frame for limb in limbs]
+    frames += [] if robot.waist is None else [robot.waist]
+    frames += [frame for closure in closures for frame in (closure.frame_a, closure.frame_b)]
+    boxes = [box for link in robot.links for box in link.boxes]
+    points = [link.com for link in robot.links] + [joint.screw.s0 for joint in joints]
+    points += [frame.p for frame in frames] + [box.center for box in boxes]
+    points += [corner for sole in robot.soles for corner in sole.corners]
+    lengths = np.linalg.norm(_array([joint.screw.s for joint in joints]), axis=-1)
+    masses = _floats([link.mass for link in robot.links])
+    return (
+        bool((masses >= 0).all() and np.isfinite(masses).all())
+        and bool(np.isfinite(_array(points)).all())
+        and bool((_array([box.size for box in boxes]) > 0).all())
+        and bool(np.isfinite(_array([box.size for box in boxes])).all())
+        and bool((np.abs(lengths - 1) < UNIT_TOLERANCE / 2).all())
+        and _are_rotations(frames)
+        and are_inertias([link.inertia for link in robot.links])
+        and all(_is_joint(joint) for joint in joints)
+        and not any(True for sole in robot.soles for _ in sole_faults(sole))
+        and all(
+            joint.lower <= x <= joint.upper
+            for posture in robot.postures
+            for joint, x in zip(joints, posture.q, strict=True)
+        )
+        and all(math.isfinite(posture.base_height) for posture in robot.postures)
+    )
+
+
+def _array(vectors: Sequence[Vector]) -> Any:
+    return _floats([(v.x, v.y, v.z) for v in vectors]).reshape(-1, 3)
+
+
+def _floats(numbers: Sequence[Any]) -> Any:
+    """Numbers as an array; anything else among them is a TypeError."""
+    array = np.array(numbers)
+    if array.size and array.dtype.kind not in "fiu":
+        raise TypeError(array.dtype)
+    return array.astype(float)
+
+
+def _are_rotations(frames: Sequence[Pose]) -> bool:
+    R = _array([column for frame in frames for column in (frame.R.x, frame.R.y, frame.R.z)]).reshape(-1, 3, 3)
+    skewed = np.abs(R @ R.swapaxes(-1, -2) - np.eye(3))
+    return bool((skewed < UNIT_TOLERANCE / 2).all() and (np.linalg.det(R) > 0).all())
+
+
+def are_inertias(inertias: Sequence[Inertia]) -> bool:
+    """Principal moments of which none is negative or larger than the sum of the others."""
+    moments = [(i.xx, i.xy, i.xz, i.xy, i.yy, i.yz, i.xz, i.yz, i.zz) for i in inertias]
+    matrices = _floats(moments).reshape(-1, 3, 3)
+    if not np.isfinite(matrices).all():
+        return False
+    a, b, c = np.linalg.eigvalsh(matrices).T
+    return bool((a >= 0).all() and (c <= a + b).all())
+
+
+def _is_joint(joint: Joint) -> bool:
+    pitch = joint.screw.pitch
+    fits = {
+        "revolute": pitch == 0,
+        "prismatic": joint.screw.is_translation,
+        "helical": pitch != 0 and math.isfinite(pitch),
+    }[joint.type]
+    ordered = joint.lower <= joint.upper and joint.lower < math.inf and joint.upper > -math.inf
+    return bool(fits and ordered and joint.velocity > 0 and joint.effort > 0)
