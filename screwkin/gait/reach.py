@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from screwkin.kinematics.positions import (
     successive_displacement,
 )
 from screwkin.model.robot import Limb, Robot
+from screwkin.model.state import State
 
 _MISSING = 1e-6
 """Singular value, relative to the largest, below which a limb cannot move its tip in a direction."""
@@ -57,6 +59,50 @@ def refuse_unreachable(
             raise UnreachableError(f"{when}: {missing}; {_other_gait(plan)}", limb.name, sample) from None
         error.args = (f"{error}. {_advice(robot, plan, limb)}",)
         raise
+    for limb in robot.limbs:
+        _refuse_other_branch(robot, plan, targets, solution, limb)
+
+
+def _refuse_other_branch(
+    robot: Robot, plan: Plan, targets: Mapping[str, Array], solution: PoseSolution, limb: Limb
+) -> None:
+    """Refuse samples in which a limb stands beyond a singular posture, where only limits can have put it.
+
+    The determinant of a limb's Jacobian keeps its sign on the way from home; it is judged for limbs with as
+    many joints as their targets have freedoms.
+
+    Raises:
+        LimitError: names limb, sample and time, and the joint that meets its limit on the way.
+    """
+    path, target = list(robot.path_to(limb.link)), targets.get(limb.tip)
+    posed = target is not None and target.shape[-2:] == (4, 4)
+    if target is None or len(path) != (6 if posed else 3):
+        return
+    start = np.array(robot.posture("home").q, dtype=float)
+    q = np.concatenate([start[None], np.reshape(solution.state.q, (-1, len(start)))])
+    screws, thetas = [robot.joints[i].screw for i in path], unstack(q[:, path])
+    tip = successive_displacement(screws, thetas, A_ref_k=limb.frame).p
+    columns = [as_array(at(tip, column), (len(q),)) for column in chain_jacobian(screws, thetas)]
+    sense = np.linalg.det(np.stack(columns, axis=-1)[:, slice(0 if posed else 3, 6)])
+    other = np.flatnonzero(sense[1:] * sense[0] < 0)
+    if not len(other) or abs(sense[0]) < _MISSING * np.abs(sense).max():
+        return
+    sample, free = int(other[0]), [replace(j, lower=-np.inf, upper=np.inf) for j in robot.joints]
+    one = {name: target[sample] for name, target in targets.items()}
+    unlimited = replace(robot, joints=tuple(free))
+    near = solve_pose(unlimited, one, State(plan.T_world_base[sample], start)).state.q
+    beyond = [max(robot.joints[i].lower - near[i], near[i] - robot.joints[i].upper) for i in path]
+    worst = path[int(np.argmax(beyond))]
+    joint = robot.joints[worst]
+    factor, unit = (1e3, "mm") if joint.type == "prismatic" else (180 / np.pi, "deg")
+    when = f"{limb.name}, sample {sample} (t = {float(plan.time[sample]):.3f} s)"
+    limits = f"limits {factor * joint.lower:.1f} to {factor * joint.upper:.1f} {unit}"
+    raise LimitError(
+        f"{when}: {joint.name} at {factor * float(near[worst]):.1f} {unit}, {limits}; bent the other way the"
+        f" limb would pass a singular posture. {_advice(robot, plan, limb)}",
+        limb.name,
+        sample,
+    )
 
 
 def _missing_freedom(robot: Robot, limb: Limb, target: Array, solution: PoseSolution, sample: int) -> str:

@@ -60,6 +60,8 @@ def assert_same_walk(one: sk.Trajectory, other: sk.Trajectory, atol: float = 1e-
     for tip in other.T_world_tip:
         np.testing.assert_allclose(one.T_world_tip[tip], other.T_world_tip[tip], atol=atol)
     assert one.meta["notes"] == other.meta["notes"]
+    for limb, sigma in other.meta["sigma"].items():
+        assert one.meta["sigma"][limb] == pytest.approx(sigma, abs=atol)
 
 
 @few
