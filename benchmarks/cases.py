@@ -13,7 +13,7 @@ import screwkin as sk
 from benchmarks import agreement, ours, workloads
 from benchmarks.contest import Contestants, Result
 from benchmarks.peers import apart, mujoco, pinocchio_contest, pinocchio_python
-from screwkin.kinematics.serial_chain import Chain
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.model.robot import Robot
 
 Provider = Callable[[], Contestants]
@@ -206,7 +206,7 @@ def _grid(robot: Robot, limb: str, wanted: int) -> tuple[tuple[float, ...], floa
     from screwkin.analysis.workspace import _grid as points
     from screwkin.analysis.workspace import default_heights
 
-    levels, chain = tuple(default_heights(robot, limb)), Chain.of(robot, limb)
+    levels, chain = tuple(default_heights(robot, limb)), SerialChain.of(robot, limb)
 
     def tried(resolution: float) -> int:
         return sum(int(np.sum(points(chain, height, resolution)[2])) for height in levels)

@@ -27,7 +27,7 @@ from benchmarks.report import time_told
 from screwkin.compiler.program import Program
 from screwkin.compiler.records import identifier
 from screwkin.compiler.run import run
-from screwkin.dynamics import body
+from screwkin.dynamics import quantities
 from screwkin.ik import programs as limbs
 from screwkin.ik.whole_body import closed_targets
 from screwkin.mechanism.tip_motion import motion
@@ -72,7 +72,7 @@ def inputs(robot: Robot, count: int) -> Iterator[tuple[Program, dict[str, Array]
     yield motion.program(robot), state | rates
     second = {"qd": rng.uniform(-1, 1, given.q.shape), "qdd": rng.uniform(-1, 1, given.q.shape)}
     second |= {"base_twist": given.waist, "base_acceleration": rng.uniform(-1, 1, (count, 6))}
-    yield body.balance.program(robot), state | second
+    yield quantities.balance.program(robot), state | second
     reach = workloads.random_reach(robot, count)
     guess = np.broadcast_to(reach.guess, (count, len(reach.guess)))
     yield limbs.limb_nearest(robot, reach.limb.name), {"T_base_tip": reach.target, "guess": guess}

@@ -18,7 +18,7 @@ from screwkin.compiler.program import Program
 from screwkin.compiler.records import identifier
 from screwkin.compiler.run import machine_code, python_function
 from screwkin.compiler.run import run as kernel
-from screwkin.dynamics import body
+from screwkin.dynamics import quantities
 from screwkin.gait.balance import ground_reaction
 from screwkin.ik import programs as limbs
 from screwkin.mechanism.tip_motion import motion
@@ -156,7 +156,7 @@ def balance(robot: Robot, given: Dynamic) -> Contestants:
         )
         return {"com": com, "momentum": sk.momentum(robot, state, given.qd, given.twist), "zmp": zmp}
 
-    program = body.balance.program(robot)
+    program = quantities.balance.program(robot)
     told = {"T_world_base": given.T_world_base, "q": given.q, "qd": given.qd, "qdd": given.qdd}
     told |= {"base_twist": given.twist, "base_acceleration": given.acceleration}
     contestants = {f"{NAME}, public functions": Contestant(_warm(run))}

@@ -113,15 +113,16 @@ def bandwidth(count: int) -> float:
 def bounds(robot: Any) -> list[Bound]:
     """The kernels of rates, balance and inverse kinematics."""
     from screwkin.compiler.run import machine_code
-    from screwkin.dynamics import body
+    from screwkin.dynamics import quantities
     from screwkin.ik import programs as limbs
+    from screwkin.kinematics import body
     from screwkin.mechanism.tip_motion import motion
 
     limb = next(limb.name for limb in robot.limbs if limb.kind == "leg")
     programs = [
         body.tip_poses.program(robot),
         motion.program(robot),
-        body.balance.program(robot),
+        quantities.balance.program(robot),
         limbs.limb_nearest(robot, limb),
     ]
     rng, speed, rows = np.random.default_rng(0), peak(), []

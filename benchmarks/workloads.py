@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import screwkin as sk
 from screwkin.analysis.ik_targets import random_targets, walking_path, walking_targets
-from screwkin.kinematics.serial_chain import Chain
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.model.robot import Limb, Robot
 
 Array = Any
@@ -45,7 +45,7 @@ class Reach:
     """W2: tip poses (B, 4, 4) of one limb in the base frame; guess (n,); whether samples follow a path."""
 
     limb: Limb
-    chain: Chain
+    chain: SerialChain
     target: Array
     guess: Array
     follows: bool
@@ -110,7 +110,7 @@ def first_leg(robot: Robot) -> Limb:
 def gait_reach(robot: Robot, count: int) -> Reach:
     """W2 along a walk (750 poses at most), sole kept level."""
     limb = first_leg(robot)
-    chain = Chain.of(robot, limb.name)
+    chain = SerialChain.of(robot, limb.name)
     target = walking_targets(chain, walking_path(chain))[:count]
     return Reach(limb, chain, target, _home(robot, chain), True)
 
@@ -118,11 +118,11 @@ def gait_reach(robot: Robot, count: int) -> Reach:
 def random_reach(robot: Robot, count: int) -> Reach:
     """W2 at random joint positions inside the limits."""
     limb = first_leg(robot)
-    chain = Chain.of(robot, limb.name)
+    chain = SerialChain.of(robot, limb.name)
     return Reach(limb, chain, random_targets(chain, count, 1), _home(robot, chain), False)
 
 
-def _home(robot: Robot, chain: Chain) -> Array:
+def _home(robot: Robot, chain: SerialChain) -> Array:
     return sk.home(robot).q[list(chain.joints)]
 
 

@@ -7,29 +7,29 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from screwkin.analysis.validate import Validation, validate
-    from screwkin.dynamics.quantities import (
-        center_of_mass,
-        com_jacobian,
-        frame_pose,
-        ground_wrench,
-        inverse_dynamics,
-        jacobian,
-        link_poses,
-        mass_matrix,
-        momentum,
-    )
+    from screwkin.dynamics.quantities import ground_wrench, inverse_dynamics, mass_matrix, momentum
     from screwkin.errors import ScrewkinError
+    from screwkin.export.bind import bind, prepare
     from screwkin.gait.balance import Balance, zmp
     from screwkin.gait.files import load_gait
     from screwkin.gait.record import Gait
     from screwkin.gait.walk import walk
     from screwkin.ik.limb import limb_ik
     from screwkin.ik.pose import solve_pose
+    from screwkin.kinematics.body import (
+        center_of_mass,
+        com_jacobian,
+        frame_pose,
+        jacobian,
+        link_poses,
+        tip_poses,
+    )
     from screwkin.mechanism.choice import closed_mechanism
     from screwkin.mechanism.closure import close_loops
     from screwkin.mechanism.mechanism import Mechanism
     from screwkin.mechanism.quantities import network_matrix, secondary_rates, virtual_motion
     from screwkin.mechanism.singularity import singularity_report
+    from screwkin.model.library import robot_names
     from screwkin.model.robot import Robot
     from screwkin.model.state import State, home
     from screwkin.model.table import load_robot
@@ -37,22 +37,22 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "analysis.validate": "Validation validate",
-    "dynamics.quantities": (
-        "center_of_mass com_jacobian frame_pose ground_wrench inverse_dynamics jacobian link_poses"
-        " mass_matrix momentum"
-    ),
+    "dynamics.quantities": "ground_wrench inverse_dynamics mass_matrix momentum",
     "errors": "ScrewkinError",
+    "export.bind": "bind prepare",
     "gait.balance": "Balance zmp",
     "gait.files": "load_gait",
     "gait.record": "Gait",
     "gait.walk": "walk",
     "ik.limb": "limb_ik",
     "ik.pose": "solve_pose",
+    "kinematics.body": "center_of_mass com_jacobian frame_pose jacobian link_poses tip_poses",
     "mechanism.choice": "closed_mechanism",
     "mechanism.closure": "close_loops",
     "mechanism.mechanism": "Mechanism",
     "mechanism.quantities": "network_matrix secondary_rates virtual_motion",
     "mechanism.singularity": "singularity_report",
+    "model.library": "robot_names",
     "model.robot": "Robot",
     "model.state": "State home",
     "model.table": "load_robot",
@@ -70,6 +70,7 @@ __all__ = [
     "State",
     "Trajectory",
     "Validation",
+    "bind",
     "center_of_mass",
     "close_loops",
     "closed_mechanism",
@@ -87,9 +88,12 @@ __all__ = [
     "mass_matrix",
     "momentum",
     "network_matrix",
+    "prepare",
+    "robot_names",
     "secondary_rates",
     "singularity_report",
     "solve_pose",
+    "tip_poses",
     "validate",
     "virtual_motion",
     "walk",

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from types import MappingProxyType
@@ -19,10 +19,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
+from screwkin.algebra.hermite import hermite, places
 from screwkin.algebra.se3 import as_array, rotation_exp, rotation_from_array, rotation_log
 from screwkin.errors import InputError, TrajectoryError, expect
 from screwkin.files import atomic_write, atomic_write_bytes, npz_bytes, read_npz
 from screwkin.model.display import html_table, listing
+from screwkin.model.robot import Robot
 from screwkin.model.state import not_rigid
 
 TIP_PREFIX = "T_world_"
@@ -139,32 +141,27 @@ class Trajectory:
         return self._file_sha256 or hashlib.sha256(npz_bytes(_arrays(self))).hexdigest()
 
     def sampled(self, times: Array) -> tuple[Array, Array]:
-        """Joint positions and rates at other times, (..., n) each, by cubic Hermite interpolation of q, qd.
-
-        Before the first and after the last sample the motion rests there.
+        """Joint positions and rates at other times, by cubic Hermite interpolation of q and qd.
 
         Args:
-            times: (...,) [s].
+            times: (...,) [s]. Before the first and after the last sample the motion rests there.
 
         Returns:
             q (..., n) [rad or m], and qd (..., n) per second.
         """
-        return _hermite(self.time, self.q, self.qd, np.asarray(times, dtype=float))
+        return hermite(self.time, self.q, self.qd, np.asarray(times, dtype=float))
 
     def base_sampled(self, times: Array) -> Array:
-        """Planned base poses at other times, (..., 4, 4).
+        """Planned base poses (..., 4, 4) at other times (...,) [s].
 
         The origin moves on the cubic Hermite spline of its positions and velocities, the orientation turns
         evenly from sample to sample.
-
-        Args:
-            times: (...,) [s].
         """
         times = np.asarray(times, dtype=float)
         T = np.zeros((*times.shape, 4, 4))
         T[..., 3, 3] = 1.0
-        T[..., :3, 3] = _hermite(self.time, self.T_world_base[:, :3, 3], self.base_twist[:, 3:], times)[0]
-        i, u, _ = _places(self.time, times)
+        T[..., :3, 3] = hermite(self.time, self.T_world_base[:, :3, 3], self.base_twist[:, 3:], times)[0]
+        i, u, _ = places(self.time, times)
         before = rotation_from_array(self.T_world_base[i, :3, :3])
         turned = rotation_log(before.T @ rotation_from_array(self.T_world_base[i + 1, :3, :3]))
         T[..., :3, :3] = as_array(before @ rotation_exp(turned * u))
@@ -227,6 +224,29 @@ def _restored(values: Mapping[str, Any], file_sha256: str) -> Trajectory:
     return trajectory
 
 
+def check_joints(robot: Robot, joint_names: Sequence[str], what: str = "the trajectory") -> None:
+    """Refuse joints that are not all of a robot's, in the order of its table.
+
+    Args:
+        robot: the robot that is to move.
+        joint_names: of what moves it.
+        what: what that is, for the message.
+
+    Raises:
+        InputError: a joint is missing or foreign, or the order is another.
+    """
+    if tuple(joint_names) == robot.joint_names:
+        return
+    missing = [name for name in robot.joint_names if name not in joint_names]
+    foreign = [name for name in joint_names if name not in robot.joint_names]
+    faults = [f"it lacks {', '.join(missing)}"] if missing else []
+    faults += [f"it has the foreign {', '.join(foreign)}"] if foreign else []
+    reason = " and ".join(faults) or "they stand in another order"
+    raise InputError(
+        f"{what}'s joints are not those of {robot.name}: {reason}; give the robot that it was planned for"
+    )
+
+
 def sha256_of(path: str | Path) -> str:
     """SHA-256 of a file's bytes, in hexadecimal.
 
@@ -237,26 +257,6 @@ def sha256_of(path: str | Path) -> str:
         return hashlib.sha256(Path(path).read_bytes()).hexdigest()
     except OSError as error:
         raise TrajectoryError(f"{path}: cannot be read: {error.strerror}") from None
-
-
-def _places(knots: Array, times: Array) -> tuple[NDArray[np.intp], Array, Array]:
-    """For every time: index of the knot before it, how far it is towards the next (0 to 1), and their gap."""
-    inside = np.clip(times, knots[0], knots[-1])
-    i = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, len(knots) - 2)
-    gap = knots[i + 1] - knots[i]
-    return i, (inside - knots[i]) / gap, gap
-
-
-def _hermite(knots: Array, values: Array, rates: Array, times: Array) -> tuple[Array, Array]:
-    """Cubic Hermite spline and its derivative; at rest before the first knot and after the last."""
-    i, u, gap = _places(knots, times)
-    u, h = u[..., None], gap[..., None]
-    a, b, rise = h * rates[i], h * rates[i + 1], values[i + 1] - values[i]
-    square, cube = 3 * rise - 2 * a - b, a + b - 2 * rise
-    value = values[i] + u * (a + u * (square + u * cube))
-    rate = (a + u * (2 * square + 3 * u * cube)) / h
-    moving = (times >= knots[0]) & (times <= knots[-1])
-    return value, np.where(moving[..., None], rate, 0.0)
 
 
 def _numbers(name: str, value: Any, shape: tuple[int, ...], faults: list[str]) -> Array:

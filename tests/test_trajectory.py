@@ -17,8 +17,9 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation, Slerp
 
-from screwkin.errors import OutputError, TrajectoryError
-from screwkin.trajectory import Trajectory, load_trajectory, sha256_of
+import screwkin as sk
+from screwkin.errors import InputError, OutputError, TrajectoryError
+from screwkin.trajectory import Trajectory, check_joints, load_trajectory, sha256_of
 
 SAMPLES, JOINTS = 7, ("hip", "knee", "ankle")
 
@@ -265,3 +266,17 @@ def test_an_unknown_suffix_or_place_is_refused_and_leaves_nothing(tmp_path: Path
     with pytest.raises(OutputError, match="No such file or directory"):
         a_walk().save(tmp_path / "absent" / "walk.npz")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_joints_must_be_those_of_the_robot_in_its_order() -> None:
+    robot = sk.load_robot("poppy12")
+    names = robot.joint_names
+    check_joints(robot, names)
+    for given, reason in (
+        (names[1:], f"it lacks {names[0]}; give"),
+        ((*names, "x0"), "it has the foreign x0; give"),
+        (("x0", *names[1:]), f"it lacks {names[0]} and it has the foreign x0"),
+        (names[::-1], "they stand in another order"),
+    ):
+        with pytest.raises(InputError, match=f"the log's joints are not those of poppy12: ({reason})"):
+            check_joints(robot, given, "the log")

@@ -23,7 +23,7 @@ from benchmarks.contest import Contestant, Contestants, Result
 from benchmarks.environments import environment, folder
 from benchmarks.timing import Elapsed
 from benchmarks.workloads import Reach, Stance
-from screwkin.kinematics.serial_chain import Chain
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.model.robot import Robot
 
 MARK = "@@ "
@@ -93,7 +93,7 @@ def _packed(given: Reach | Stance) -> dict[str, Any]:
 def _unpacked(robot: Robot, held: Any) -> Reach | Stance:
     if "limb" in held:
         limb = robot.limb(str(held["limb"]))
-        chain = Chain.of(robot, limb.name)
+        chain = SerialChain.of(robot, limb.name)
         return Reach(limb, chain, held["target"], held["guess"], bool(held["follows"]))
     tips = {name.removeprefix("tip:"): held[name] for name in held if name.startswith("tip:")}
     return Stance(held["T_world_base"], tips, held["guess"])

@@ -71,15 +71,33 @@ def newton(
 
 
 def _step(J: Array, r: Array, damping: Array) -> Array:
-    """Damped least-squares steps; the pure Newton step where the damping is zero and J is regular."""
+    """Damped least-squares steps; the pure Newton step where the damping is zero and J is regular.
+
+    Every sample is decided and computed by itself, whatever stands beside it.
+    """
     m, n = J.shape[1:]
-    if m == n and not damping.any():
-        try:
-            return np.asarray(np.linalg.solve(J, r[..., None])[..., 0])
-        except np.linalg.LinAlgError:
-            pass
-    lift = np.maximum(damping, 1e-14)[:, None, None]
+    step = np.full((len(J), n), np.nan)
+    if m == n:
+        pure = damping == 0
+        step[pure] = solved(J[pure], r[pure])
+    rest = ~np.isfinite(step).all(axis=1)
+    if not rest.any():
+        return step
+    J, r, lift = J[rest], r[rest], np.maximum(damping[rest], 1e-14)[:, None, None]
     Jt = J.swapaxes(1, 2)
     if m <= n:
-        return np.asarray((Jt @ np.linalg.solve(J @ Jt + lift * np.eye(m), r[..., None]))[..., 0])
-    return np.asarray(np.linalg.solve(Jt @ J + lift * np.eye(n), Jt @ r[..., None])[..., 0])
+        step[rest] = (Jt @ solved(J @ Jt + lift * np.eye(m), r)[..., None])[..., 0]
+    else:
+        step[rest] = solved(Jt @ J + lift * np.eye(n), (Jt @ r[..., None])[..., 0])
+    return np.where(np.isfinite(step), step, 0.0)
+
+
+def solved(A: Array, b: Array) -> Array:
+    """Solutions (B, n) of the systems A (B, n, n) x = b (B, n); NaN where a matrix is singular."""
+    try:
+        return np.asarray(np.linalg.solve(A, b[..., None])[..., 0])
+    except np.linalg.LinAlgError:
+        if len(A) == 1:
+            return np.full(b.shape, np.nan)
+        half = len(A) // 2
+        return np.concatenate([solved(A[:half], b[:half]), solved(A[half:], b[half:])])

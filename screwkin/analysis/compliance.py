@@ -4,7 +4,7 @@ A single run proves little, for contact is chaotic: the same walk is played for 
 step, and what counts is the median and the range of the largest ZMP error. A run that falls has no largest
 error; it is counted as fallen and enters no average.
 
-Source: paper B, table 7; docs/papers.md tells what is read into it.
+Source: paper B, table 7; docs/papers.md says how it is read.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from screwkin.algebra.arrays import Array
 from screwkin.compliance.springs import StiffnessChoice
 from screwkin.errors import InputError
 from screwkin.gait.compensation import WAYS, compensate, way_of
@@ -27,7 +28,7 @@ from screwkin.trajectory import Trajectory
 
 Treatment = Literal["none", "swing", "joint", "dynamic"]
 TREATMENTS: tuple[Treatment, ...] = ("none", "swing", "joint", "dynamic")
-"""``none`` plays the plan itself, the others what ``compensate`` makes of it in one of its ``WAYS``."""
+"""``none`` plays the plan itself, the others what ``compensate`` returns in one of its ``WAYS``."""
 
 Pair = tuple[float, float]
 
@@ -83,10 +84,10 @@ class StudyRow:
     def to_dict(self) -> dict[str, Any]:
         """All but the ZMPs over time, as JSON data."""
         bare = replace(self, trials=tuple(replace(trial, zmp=None) for trial in self.trials))
-        told = asdict(bare)
-        for trial in told["trials"]:
+        data = asdict(bare)
+        for trial in data["trials"]:
             del trial["zmp"]
-        return told
+        return data
 
 
 def compliance_study(
@@ -102,11 +103,11 @@ def compliance_study(
     """Largest error of the contact ZMP against the planned one, with and without compensation.
 
     Args:
-        robot: of which the trajectory speaks.
-        trajectory: the intended walk, not compensated yet.
+        robot: the trajectory's robot.
+        trajectory: the planned walk, not compensated yet.
         stiffness: of the joints, in the simulation and for the compensation; see ``joint_stiffness``.
         treatments: ``none``; ``swing`` and ``joint``, by statics; ``dynamic``: joints by the walk's torques.
-        conditions: what is varied, and what else yields.
+        conditions: what is varied, and what else is compliant.
         passes: of the compensation.
         progress: called now and then with the share done.
 
@@ -121,20 +122,20 @@ def compliance_study(
         raise InputError("the trajectory is compensated already; give the walk as it was planned")
     unknown = [name for name in treatments if name not in TREATMENTS]
     if unknown or not treatments:
-        found = f"unknown treatment {unknown[0]!r}" if unknown else "no treatment"
-        raise InputError(f"{found}; valid: {', '.join(TREATMENTS)}")
+        fault = f"unknown treatment {unknown[0]!r}" if unknown else "no treatment"
+        raise InputError(f"{fault}; valid: {', '.join(TREATMENTS)}")
     trials: list[Trial] = []
     for done, treatment in enumerate(treatments):
-        told = trajectory
+        commanded = trajectory
         if treatment != "none":
             method, model = WAYS[treatment]
-            told = compensate(robot, trajectory, stiffness, method, passes, model)
+            commanded = compensate(robot, trajectory, stiffness, method, passes, model)
 
         def so_far(share: float, done: int = done) -> None:
             if progress is not None:
                 progress((done + share) / len(treatments))
 
-        trials += repeated(robot, told, stiffness, conditions, so_far)
+        trials += repeated(robot, commanded, stiffness, conditions, so_far)
     return summarised(trials)
 
 
@@ -146,13 +147,13 @@ def repeated(
     progress: Callable[[float], None] | None = None,
 ) -> list[Trial]:
     """One trial of a trajectory, compensated or not, per friction and time step; see ``compliance_study``."""
-    given = conditions or Conditions()
-    cases = [(friction, dt) for friction in given.frictions for dt in given.steps]
+    chosen = conditions or Conditions()
+    cases = [(friction, dt) for friction in chosen.frictions for dt in chosen.steps]
     if not cases:
         raise InputError("no conditions; give at least one friction and one time step")
     trials = []
     for friction, dt in cases:
-        trials.append(_trial(robot, trajectory, stiffness, way_of(trajectory), friction, dt, given))
+        trials.append(_trial(robot, trajectory, stiffness, way_of(trajectory), friction, dt, chosen))
         if progress is not None:
             progress(len(trials) / len(cases))
     return trials
@@ -175,39 +176,40 @@ def summarised(trials: Sequence[Trial]) -> tuple[StudyRow, ...]:
 
 def _trial(
     robot: Robot,
-    told: Trajectory,
+    commanded: Trajectory,
     stiffness: StiffnessChoice,
     treatment: Treatment,
     friction: float,
     dt: float,
-    given: Conditions,
+    conditions: Conditions,
 ) -> Trial:
     """One run from settling to the end, or to its fall."""
     physics = Physics(
-        dt=dt, friction=friction, sole_stiffness=given.sole_stiffness, sole_damping=given.sole_damping
+        dt=dt,
+        friction=friction,
+        sole_stiffness=conditions.sole_stiffness,
+        sole_damping=conditions.sole_damping,
     )
-    yields = Compliance(stiffness, given.joint_damping, given.rotor_inertia)
-    backend = CompliantBackend(robot, yields, physics)
+    compliance = Compliance(stiffness, conditions.joint_damping, conditions.rotor_inertia)
+    backend = CompliantBackend(robot, compliance, physics)
     try:
-        run = simulate(robot, told, backend, given.schedule)
+        run = simulate(robot, commanded, backend, conditions.schedule)
     finally:
         backend.close()
-    zmp = zmp_record(run, told)
+    zmp = zmp_record(run, commanded)
     error = 1e3 * np.abs(zmp.contact - zmp.planned)
     error = error[np.isfinite(error).all(axis=1)]
     x, y = error.max(axis=0).tolist() if len(error) else (np.nan, np.nan)
     return Trial(treatment, friction, dt, run.fallen_at, (x, y), zmp)
 
 
-def _stood(
-    trials: Sequence[Trial], treatment: Treatment
-) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+def _stood(trials: Sequence[Trial], treatment: Treatment) -> Array:
     """Largest errors (m, 2) of the runs that did not fall."""
-    kept = [trial.zmp_max_mm for trial in trials if trial.treatment == treatment and trial.fell_at is None]
-    return np.array(kept, dtype=float).reshape(-1, 2)
+    largest = [trial.zmp_max_mm for trial in trials if trial.treatment == treatment and trial.fell_at is None]
+    return np.array(largest, dtype=float).reshape(-1, 2)
 
 
-def _median(errors: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> Pair | None:
+def _median(errors: Array) -> Pair | None:
     if not len(errors):
         return None
     x, y = np.median(errors, axis=0).tolist()

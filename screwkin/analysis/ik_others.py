@@ -17,7 +17,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array
 from screwkin.ik.closed import EXACT
 from screwkin.ik.numeric import IkSettings
-from screwkin.kinematics.serial_chain import Chain, distance
+from screwkin.kinematics.serial_chain import SerialChain, distance
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ def _library(name: str) -> Any:
         return None
 
 
-def pinocchio_model(pin: Any, chain: Chain) -> Any:
+def pinocchio_model(pin: Any, chain: SerialChain) -> Any:
     """The limb as a Pinocchio model; its joint frames are parallel to the base in the zero pose."""
     model, parent, origin = pin.Model(), 0, np.zeros(3)
     for name, screw in zip(chain.names, chain.screws, strict=True):
@@ -49,7 +49,7 @@ def pinocchio_model(pin: Any, chain: Chain) -> Any:
     return model
 
 
-def pinocchio_clik(chain: Chain, target: Array, settings: IkSettings) -> Outcome | None:
+def pinocchio_clik(chain: SerialChain, target: Array, settings: IkSettings) -> Outcome | None:
     """Closed-loop inverse kinematics as Pinocchio's documentation shows it: damping 1e-12, step 0.1."""
     pin = _library("pinocchio")
     if pin is None or not chain.turning.all():
@@ -85,14 +85,14 @@ def pinocchio_clik(chain: Chain, target: Array, settings: IkSettings) -> Outcome
     return Outcome(q, solved, iterations, time.perf_counter() - begin)
 
 
-def offset_parameters(chain: Chain) -> tuple[Array, Array]:
+def offset_parameters(chain: SerialChain) -> tuple[Array, Array]:
     """Axes (n, 3); offsets (n + 1, 3) from the base to the first, from axis to axis, and to the tip."""
     axes = np.array([as_array(screw.s) for screw in chain.screws], dtype=float)
     points = [np.zeros(3), *(as_array(screw.s0) for screw in chain.screws), as_array(chain.tip.p)]
     return axes, np.diff(np.array(points, dtype=float), axis=0)
 
 
-def eaik(chain: Chain, target: Array, settings: IkSettings) -> Outcome | None:
+def eaik(chain: SerialChain, target: Array, settings: IkSettings) -> Outcome | None:
     """EAIK: subproblem decomposition chosen by the limb's geometry; its nearest branch to q = 0."""
     library = _library("eaik.IK_HP")
     if library is None or not chain.turning.all():
@@ -116,7 +116,7 @@ def eaik(chain: Chain, target: Array, settings: IkSettings) -> Outcome | None:
     return Outcome(q, solved, np.ones(len(target), dtype=int), seconds)
 
 
-OTHERS: tuple[tuple[str, str, Callable[[Chain, Array, IkSettings], Outcome | None]], ...] = (
+OTHERS: tuple[tuple[str, str, Callable[[SerialChain, Array, IkSettings], Outcome | None]], ...] = (
     ("pinocchio-clik", "from q = 0; damping 1e-12, step 0.1", pinocchio_clik),
     ("eaik", "all branches; solved to 1e-6", eaik),
 )

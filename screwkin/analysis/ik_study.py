@@ -18,8 +18,9 @@ from screwkin.analysis.ik_targets import path_notes, random_targets, walking_pat
 from screwkin.errors import InputError
 from screwkin.ik.closed import closed_form
 from screwkin.ik.hybrid import spherical_variant
-from screwkin.ik.numeric import IkSettings, Method, solve_limb
-from screwkin.kinematics.serial_chain import Chain
+from screwkin.ik.limb import Method, solve_limb
+from screwkin.ik.numeric import IkSettings
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.model.robot import Robot
 
 PAPER_TABLE_5 = {
@@ -100,7 +101,7 @@ def ik_study(
     """
     if poses < 1 or cap < 1:
         raise InputError(f"poses is {poses} and cap is {cap}; both must be at least 1")
-    chain = Chain.of(robot, limb)
+    chain = SerialChain.of(robot, limb)
     entries = fitting_entries(chain, cap)
     sets: list[tuple[str, Array]] = []
     notes = settings_notes(cap)
@@ -124,7 +125,7 @@ def ik_study(
     return IkStudy(robot.name, chain.limb, tuple(rows), tuple(notes))
 
 
-def fitting_entries(chain: Chain, cap: int) -> list[Entry]:
+def fitting_entries(chain: SerialChain, cap: int) -> list[Entry]:
     """The methods that fit a limb, from the best informed to the plainest."""
     base = IkSettings(position_tolerance=1e-6, rotation_tolerance=1e-6, max_iterations=cap)
     soft = replace(base, damping=0.055)
@@ -146,7 +147,7 @@ def fitting_entries(chain: Chain, cap: int) -> list[Entry]:
     ]
 
 
-def _fits(recognise: Callable[[Chain], object], chain: Chain) -> bool:
+def _fits(recognise: Callable[[SerialChain], object], chain: SerialChain) -> bool:
     try:
         recognise(chain)
     except InputError:
@@ -154,7 +155,7 @@ def _fits(recognise: Callable[[Chain], object], chain: Chain) -> bool:
     return True
 
 
-def measured(chain: Chain, data: str, target: Array, entry: Entry) -> IkRow:
+def measured(chain: SerialChain, data: str, target: Array, entry: Entry) -> IkRow:
     """The row of one method on targets (B, 4, 4)."""
     count = len(target)
     start = np.zeros((count, len(chain.names)))
@@ -165,7 +166,7 @@ def measured(chain: Chain, data: str, target: Array, entry: Entry) -> IkRow:
     return _row(chain, data, entry.name, entry.told, outcome, entry.settings.max_iterations)
 
 
-def _row(chain: Chain, data: str, name: str, told: str, outcome: Outcome, cap: int) -> IkRow:
+def _row(chain: SerialChain, data: str, name: str, told: str, outcome: Outcome, cap: int) -> IkRow:
     iterations = np.where(outcome.solved, outcome.iterations, cap)
     inside = outcome.solved & chain.within(chain.wrapped(outcome.q))
     return IkRow(

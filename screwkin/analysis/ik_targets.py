@@ -8,8 +8,9 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, unstack
 from screwkin.analysis.foot_path import FootPath, foot_from_waist
 from screwkin.errors import InputError, UnreachableError
-from screwkin.ik.numeric import IkSettings, solve_limb
-from screwkin.kinematics.serial_chain import Chain, forward
+from screwkin.ik.limb import solve_limb
+from screwkin.ik.numeric import IkSettings
+from screwkin.kinematics.serial_chain import SerialChain, forward
 
 HIGHEST = 0.43 / 0.437
 """Height of the waist over that with straight legs in paper B's gait."""
@@ -17,14 +18,14 @@ STEP, LIFT = 0.06 / 0.43, 0.03 / 0.43
 """Its step and the swing foot's lift, over the waist's height."""
 
 
-def random_targets(chain: Chain, poses: int, seed: int) -> Array:
+def random_targets(chain: SerialChain, poses: int, seed: int) -> Array:
     """Tip poses (poses, 4, 4) of uniformly random joint positions inside the limits (or half a turn)."""
     lower, upper = (np.clip(limit, -np.pi, np.pi) for limit in (chain.lower, chain.upper))
     q = np.random.default_rng(seed).uniform(lower, upper, (poses, len(lower)))
     return as_array(forward(chain.screws, unstack(q), chain.tip)[0], (poses,))
 
 
-def walking_targets(chain: Chain, path: FootPath) -> Array:
+def walking_targets(chain: SerialChain, path: FootPath) -> Array:
     """Tip poses (T, 4, 4) in the base frame along a walk, the sole kept as in the zero pose."""
     home = as_array(chain.tip).astype(float)
     places = foot_from_waist(path, 1 if home[1, 3] >= 0 else -1)
@@ -33,7 +34,7 @@ def walking_targets(chain: Chain, path: FootPath) -> Array:
     return target
 
 
-def walking_path(chain: Chain, waist: float | None = None) -> FootPath:
+def walking_path(chain: SerialChain, waist: float | None = None) -> FootPath:
     """Paper B's walk in a leg's own size: feet below its zero pose, step and lift in proportion.
 
     Args:

@@ -9,7 +9,8 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.analysis.stiffness_maps import DeflectionMap
-from screwkin.analysis.workspace import OUT_OF_REACH, WorkspaceMap
+from screwkin.analysis.workspace import WorkspaceMap
+from screwkin.ik.reach import OUT_OF_REACH
 
 
 @dataclass(frozen=True, eq=False)

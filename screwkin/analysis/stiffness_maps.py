@@ -36,7 +36,7 @@ class DeflectionMap:
         joint_names: of all joints.
         stiffness: (n,) theirs [N m/rad].
         change: (X, Y, 6) rotation vector [rad] and translation [m] of the swinging tip, axes of the unloaded
-            waist; NaN where it cannot be or where the joints are too soft for any equilibrium.
+            waist; NaN where it is not reachable or where the joints are too soft for any equilibrium.
         base_change: (X, Y, 6) of the waist.
     """
 
@@ -73,17 +73,17 @@ class DeflectionMap:
         length = 1e3 * self.magnitude[np.isfinite(self.magnitude)]
         none = not len(length)
         middle, most = (np.nan, np.nan) if none else (float(np.median(length)), float(length.max()))
-        told: dict[str, Any] = {"median_mm": middle, "max_mm": most}
+        summary: dict[str, Any] = {"median_mm": middle, "max_mm": most}
         for k, axis in enumerate("xyz"):
             values = 1e3 * self.translation[..., k]
-            told[f"{axis}_mm"] = (
+            summary[f"{axis}_mm"] = (
                 [np.nan] * 2 if none else [float(np.nanmin(values)), float(np.nanmax(values))]
             )
-        told["collapsed"] = int((self.place.reachable & np.isnan(self.magnitude)).sum())
+        summary["collapsed"] = int((self.place.reachable & np.isnan(self.magnitude)).sum())
         unit = self.common_stiffness if self.method == "linear" else None
-        told["unit_median"] = None if unit is None else middle * unit
-        told["unit_max"] = None if unit is None else most * unit
-        return told
+        summary["unit_median"] = None if unit is None else middle * unit
+        summary["unit_max"] = None if unit is None else most * unit
+        return summary
 
 
 def other_leg(robot: Robot, limb: str) -> str:
@@ -111,13 +111,13 @@ def stiffness_maps(
     """Deflection of a tip all over its workspace, while another tip stands still.
 
     Args:
-        robot: n joints; upright where nothing yields.
+        robot: n joints; upright where nothing deflects.
         places: maps of the swinging limb's workspace.
         stiffness: see ``joint_stiffness``.
         method: linear, or nonlinear (the true equilibrium).
         support: tip that stands still; default: the other leg's.
         posture: of all other joints, by name; default: the zero pose, as in paper B.
-        progress: told the share done.
+        progress: called with the share done.
 
     Raises:
         InputError, UnknownNameError: support, posture or stiffness is wrong.
@@ -130,7 +130,7 @@ def stiffness_maps(
         limb = robot.limb(place.limb)
         stand = other_leg(robot, place.limb) if support is None else support
         if robot.frame(stand)[0] == limb.link:
-            raise InputError(f"{stand} cannot bear the robot and be moved about; name another support")
+            raise InputError(f"{stand} cannot support the robot and be moved about; name another support")
         own = list(robot.path_to(limb.link))
         rows, columns = np.nonzero(place.reachable)
         change = np.full((*place.cause.shape, 2, 6), np.nan)
@@ -138,11 +138,11 @@ def stiffness_maps(
             here = rows[begin : begin + BLOCK], columns[begin : begin + BLOCK]
             posed = np.tile(q, (len(here[0]), 1))
             posed[:, own] = place.q[here]
-            yielded = static_deflection(robot, State(np.eye(4), posed), stand, by_name, method)
-            both = np.stack([yielded.of(limb.tip), yielded.of("base")], axis=1)
+            bent = static_deflection(robot, State(np.eye(4), posed), stand, by_name, method)
+            both = np.stack([bent.of(limb.tip), bent.of("base")], axis=1)
             # To first order springs of any stiffness bend, and only scale; an equilibrium must also last.
-            held = yielded.converged & (yielded.stable | (method == "linear"))
-            change[here] = np.where(held[:, None, None], both, np.nan)
+            lasting = bent.converged & (bent.stable | (method == "linear"))
+            change[here] = np.where(lasting[:, None, None], both, np.nan)
             progress((number + (begin + len(posed)) / len(rows)) / len(places))
         maps.append(DeflectionMap(place, stand, method, robot.joint_names, k, *np.moveaxis(change, -2, 0)))
     return maps

@@ -1,8 +1,8 @@
 """Where a limb can put its tip with the tip's orientation locked, level by level below the waist.
 
-At every point of a horizontal grid all branches of the limb's inverse kinematics are found. A point is
-reachable if one of them keeps the joint limits; else the map says what cuts there: the limb's size, or the
-limit of which joint. Inside, the inverse condition number tells how near a singularity the limb is.
+At every point of a horizontal grid all branches of the limb's inverse kinematics are computed. A point is
+reachable if one of them is within the joint limits; else the map says what cuts there: the limb's size, or
+the limit of which joint. Inside, the inverse condition number says how near a singularity the limb is.
 
 Source: paper B, section 3.3.
 """
@@ -16,26 +16,19 @@ from itertools import pairwise
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.algebra.se3 import as_array, cross, dot, norm
-from screwkin.compiler.run import run
+from screwkin.algebra.se3 import cross, dot, norm
 from screwkin.errors import InputError
-from screwkin.ik.limb_map import limb_map
-from screwkin.ik.numeric import IkSettings, solve_limb
-from screwkin.ik.programs import solvable
-from screwkin.ik.solutions import LimbSolutions
-from screwkin.kinematics.serial_chain import Chain, missing
+from screwkin.ik.limb import resting
+from screwkin.ik.reach import OUT_OF_REACH, REACHABLE, cause_names, reach
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.model.robot import Robot
 
 Progress = Callable[[float], None]
 
 LEVELS = (0.745, 0.80, 0.86, 0.915, 0.985)
 """Default heights as fractions of the straight limb: those at which paper B draws its maps."""
-REACHABLE, OUT_OF_REACH = 0, 1
-BLOCK = 4096
-"""Points solved together, so that intermediate arrays stay in the processor's cache."""
-LARGE_BLOCK = 524_288
-"""Points that a kernel computes together: it keeps to the cache by itself and shares them among cores; the
-solvers, whose calls cost much, then take all that it leaves open at once."""
+BLOCK = 32_768
+"""Points solved together, between two calls of ``progress``."""
 LARGEST_GRID = 2_000_000
 
 
@@ -109,12 +102,19 @@ def workspace(
         limb: name of a limb with six joints or more.
         heights: of the waist above the tip [m]; default: ``default_heights``.
         resolution: distance of grid points [m].
-        progress: told the share done.
+        progress: called with the share done.
 
     Raises:
-        InputError: the limb has too few joints, or heights or resolution make no grid.
+        InputError: the limb has too few joints, heights or resolution make no grid, or there are closures.
+        UnknownNameError: no such limb.
     """
-    chain = Chain.of(robot, limb)
+    chain = SerialChain.of(robot, limb)
+    if robot.closures:
+        names = ", ".join(closure.name for closure in robot.closures)
+        raise InputError(
+            f"{robot.name} has closures ({names}); workspaces are mapped for trees only, and no function "
+            "maps those of closed loops yet"
+        )
     if len(chain.joints) < 6:
         raise InputError(
             f"{chain.limb} has {len(chain.joints)} joints; six are needed to hold its tip's orientation"
@@ -139,7 +139,7 @@ def default_heights(robot: Robot, limb: str) -> list[float]:
     Raises:
         InputError: the limb does not hang down in the zero pose.
     """
-    chain = Chain.of(robot, limb)
+    chain = SerialChain.of(robot, limb)
     top = float(chain.screws[0].s0.z)
     drop = top - float(chain.tip.p.z)
     if drop < 0.02:
@@ -147,7 +147,7 @@ def default_heights(robot: Robot, limb: str) -> list[float]:
     return [round(round((fraction * drop - top) / 0.005) * 0.005, 9) for fraction in LEVELS]
 
 
-def normalising_length(chain: Chain) -> float:
+def normalising_length(chain: SerialChain) -> float:
     """Length [m] that makes velocities comparable with angular ones: thigh and shin.
 
     The sum of the distances between neighbouring parallel axes; the limb's size if there are none.
@@ -160,24 +160,21 @@ def normalising_length(chain: Chain) -> float:
     return total if total > 1e-3 else chain.length
 
 
-def _level(robot: Robot, chain: Chain, height: float, resolution: float, progress: Progress) -> WorkspaceMap:
+def _level(
+    robot: Robot, chain: SerialChain, height: float, resolution: float, progress: Progress
+) -> WorkspaceMap:
     """The map of one height."""
     x, y, near = _grid(chain, height, resolution)
     n, count = len(chain.joints), near.size
     cause = np.full(count, OUT_OF_REACH, dtype=np.int16)
     inverse, q = np.full(count, np.nan), np.full((count, n), np.nan)
-    length, guess = normalising_length(chain), _guess(robot, chain)
+    length, guess = normalising_length(chain), resting(robot, chain)
     tried = np.flatnonzero(near)
-    compiled = solvable(robot, chain.limb, True)
-    block = LARGE_BLOCK if compiled else BLOCK
-    for begin in range(0, len(tried), block):
-        here = tried[begin : begin + block]
+    for begin in range(0, len(tried), BLOCK):
+        here = tried[begin : begin + BLOCK]
         row, column = np.divmod(here, len(y))
         points = np.stack([x[row], y[column], np.full(len(here), -height)], axis=1)
-        if compiled:
-            cause[here], q[here], inverse[here] = _compiled(robot, chain, points, guess, length)
-        else:
-            cause[here], q[here], inverse[here] = _found(chain, points, guess, length)
+        cause[here], q[here], inverse[here] = reach(robot, chain.limb, points, guess, length)
         progress((begin + len(here)) / len(tried))
     rows, columns = _window((cause != OUT_OF_REACH).reshape(len(x), len(y)))
     shape = (len(x), len(y))
@@ -191,63 +188,13 @@ def _level(robot: Robot, chain: Chain, height: float, resolution: float, progres
         x[rows],
         y[columns],
         cause.reshape(shape)[rows, columns],
-        _cause_names(chain),
+        cause_names(chain),
         inverse.reshape(shape)[rows, columns],
         q.reshape(*shape, n)[rows, columns],
     )
 
 
-def _found(chain: Chain, points: Array, guess: Array, length: float) -> tuple[Array, Array, Array]:
-    """Cause (B,), q (B, n) and inverse condition (B,) where the tip is at points (B, 3) of the base frame."""
-    count = len(points)
-    target = np.tile(as_array(chain.tip).astype(float), (count, 1, 1))
-    target[:, :3, 3] = points
-    start = np.tile(guess, (count, 1))
-    found = solve_limb(chain, target, "auto", start, IkSettings(), (count,), nearest=False)
-    cause = _causes(chain, found)
-    good = cause == REACHABLE
-    inverse = np.full(count, np.nan)
-    inverse[good] = _inverse_condition(chain, found.best[good], target[good], length)
-    return cause, np.where(good[:, None], found.best, np.nan), inverse
-
-
-def _compiled(
-    robot: Robot, chain: Chain, points: Array, guess: Array, length: float
-) -> tuple[Array, Array, Array]:
-    """As ``_found`` by the limb's kernel; what that leaves open is found by the solvers."""
-    told = run(limb_map(robot, chain.limb, tuple(guess.tolist()), length), {"point": points})
-    cause, q, inverse = told["cause"][:, 0].astype(np.int16), told["q"], told["inverse"][:, 0]
-    sure = told["sure"] > 0
-    lost = cause != REACHABLE
-    q[lost], inverse[lost] = np.nan, np.nan
-    again = np.flatnonzero(sure[:, 0] & ~sure[:, 1] & ~lost)
-    target = np.tile(as_array(chain.tip).astype(float), (len(again), 1, 1))
-    target[:, :3, 3] = points[again]
-    inverse[again] = _inverse_condition(chain, q[again], target, length)
-    for part in _blocks(np.flatnonzero(~sure[:, 0])):
-        cause[part], q[part], inverse[part] = _found(chain, points[part], guess, length)
-    return cause, q, inverse
-
-
-def _blocks(samples: Array) -> list[Array]:
-    return [samples[i : i + BLOCK] for i in range(0, len(samples), BLOCK)]
-
-
-def _cause_names(chain: Chain) -> tuple[str, ...]:
-    sides = [f"{name} {side}" for name in chain.names for side in ("lower", "upper")]
-    return ("reachable", "out of reach", *sides)
-
-
-def _guess(robot: Robot, chain: Chain) -> Array:
-    """The home posture if the table has one, else the middle of the limits."""
-    for posture in robot.postures:
-        if posture.name == "home":
-            return np.array(posture.q, dtype=float)[list(chain.joints)]
-    bounded = np.isfinite(chain.lower) & np.isfinite(chain.upper)
-    return np.where(bounded, (np.where(bounded, chain.lower, 0) + np.where(bounded, chain.upper, 0)) / 2, 0.0)
-
-
-def _grid(chain: Chain, height: float, resolution: float) -> tuple[Array, Array, Array]:
+def _grid(chain: SerialChain, height: float, resolution: float) -> tuple[Array, Array, Array]:
     """Multiples of the resolution x (X,), y (Y,), and which points (X, Y) the limb's size may allow.
 
     With the tip's orientation held, a point of the last axis moves as the tip does; from the first axis it
@@ -278,29 +225,8 @@ def _grid(chain: Chain, height: float, resolution: float) -> tuple[Array, Array,
     return x, y, near
 
 
-def _causes(chain: Chain, found: LimbSolutions) -> Array:
-    """(B,) index of what decides: of all branches the one least beyond the limits, and its worst joint."""
-    below, above = chain.lower - found.q, found.q - chain.upper
-    beyond = np.where(found.valid[..., None], np.maximum(below, above), np.inf)
-    branch = beyond.max(axis=-1).argmin(axis=-1)[:, None, None]
-    joint = np.take_along_axis(beyond, branch, axis=1)[:, 0].argmax(axis=-1)
-    each = np.arange(len(joint))
-    upper = above[each, branch[:, 0, 0], joint] > below[each, branch[:, 0, 0], joint]
-    limit = OUT_OF_REACH + 1 + 2 * joint + upper
-    reached = np.where(found.valid.any(axis=-1), limit, OUT_OF_REACH)
-    return np.where(found.in_limits.any(axis=-1), REACHABLE, reached).astype(np.int16)
-
-
-def _inverse_condition(chain: Chain, q: Array, target: Array, length: float) -> Array:
-    """Smallest over largest singular value (B,) of the Jacobian at the tip, velocities over a length."""
-    _, J = missing(chain, q, target)
-    J[:, 3:] /= length
-    values = np.linalg.svd(J, compute_uv=False)
-    return values[:, -1] / values[:, 0]
-
-
 def _window(seen: Array) -> tuple[slice, slice]:
-    """Rows and columns around what is seen, one point wider."""
+    """Rows and columns around what is true of (X, Y), one point wider."""
     spans = []
     for axis in (1, 0):
         hits = np.flatnonzero(seen.any(axis=axis))

@@ -66,13 +66,17 @@ class Native:
 
         The arrays must outlive it.
         """
-        count, arrays = len(outputs[0]), [*inputs, *outputs]
+        return self.at(len(outputs[0]), inputs, outputs)
+
+    def at(self, count: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> Callable[[], object]:
+        """The same for arrays of any shape that hold ``count`` samples one after the other."""
+        arrays = [*inputs, *outputs]
         cores = (self.cores or _cores()) if count >= THREADED_FROM else 1
         if cores == 1:
             return partial(self.function, count, *map(_address, arrays))
         bounds = [count * k // cores for k in range(cores + 1)]
         own, *others = [
-            (stop - start, *(_address(a) + start * a.strides[0] for a in arrays))
+            (stop - start, *(_address(a) + start * (a.nbytes // count) for a in arrays))
             for start, stop in pairwise(bounds)
         ]
 

@@ -146,6 +146,21 @@ class Recorder:
         self._places += [node.index for node in nodes]
         return nodes
 
+    def shared(self, name: str, *shape: int) -> list[Any]:
+        """The scalars of an input array that formulas share: the known one of that name, or a new one.
+
+        Raises:
+            InputError: the known one has another shape.
+        """
+        at = 0
+        for group in self._inputs:
+            if group.name == name:
+                if group.shape != shape:
+                    raise InputError(f"{name} is wanted with shape {shape} and with {group.shape}")
+                return [Node(self.graph, index) for index in self._places[at : at + group.size]]
+            at += group.size
+        return self.input(name, *shape)
+
     def output(self, name: str, values: Any, *shape: int) -> None:
         """An output array: scalars, or records whose leaves are taken in order."""
         flat = [leaf for value in values for leaf in leaves(value)]

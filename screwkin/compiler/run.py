@@ -14,7 +14,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.compiler import emit_python, native
-from screwkin.compiler.program import Group, Program, kept_with
+from screwkin.compiler.program import Program, kept_with
 
 Way = Literal["python", "numpy", "C"]
 
@@ -42,12 +42,17 @@ def run(
     arrays = [np.asarray(inputs[group.name], dtype=float) for group in program.inputs]
     if batch is None:
         batch = common_batch(arrays, [len(group.shape) for group in program.inputs])
-    count = math.prod(batch)
-    flat = [_flat(a, batch, count, g) for a, g in zip(arrays, program.inputs, strict=True)]
+    rows = [as_rows(a, batch, group.shape) for a, group in zip(arrays, program.inputs, strict=True)]
+    filled = run_rows(program, rows, math.prod(batch), path)
+    return {g.name: a.reshape(*batch, *g.shape) for g, a in zip(program.outputs, filled, strict=True)}
+
+
+def run_rows(program: Program, rows: Sequence[Array], count: int, path: Way | None = None) -> list[Array]:
+    """Outputs as rows (count, size) from inputs as C-contiguous rows (count, size); see ``run``."""
     filled = [np.empty((count, group.size)) for group in program.outputs]
     if count:
-        _ways(program)[path or chosen_path(program, count)](flat, filled)
-    return {g.name: a.reshape(*batch, *g.shape) for g, a in zip(program.outputs, filled, strict=True)}
+        _ways(program)[path or chosen_path(program, count)](rows, filled)
+    return filled
 
 
 def common_batch(arrays: Iterable[Any], inner: Iterable[int]) -> tuple[int, ...]:
@@ -60,11 +65,11 @@ def common_batch(arrays: Iterable[Any], inner: Iterable[int]) -> tuple[int, ...]
     return first if all(shape == first for shape in others) else np.broadcast_shapes(first, *others)
 
 
-def _flat(array: Array, batch: tuple[int, ...], count: int, group: Group) -> Array:
-    """An input as C-contiguous rows (count, size)."""
-    shape = (*batch, *group.shape)
-    whole = array if array.shape == shape else np.broadcast_to(array, shape)
-    rows = whole.reshape(count, group.size)
+def as_rows(array: Array, batch: tuple[int, ...], shape: tuple[int, ...]) -> Array:
+    """An array that broadcasts to (*batch, *shape) as C-contiguous rows (count, size)."""
+    wanted = (*batch, *shape)
+    whole = array if array.shape == wanted else np.broadcast_to(array, wanted)
+    rows = whole.reshape(math.prod(batch), math.prod(shape))
     return rows if rows.flags.c_contiguous else np.ascontiguousarray(rows)
 
 
@@ -79,7 +84,7 @@ def chosen_path(program: Program, count: int) -> Way:
 
 
 def prepare(program: Program) -> bool:
-    """Compile a program, so that ``run`` computes it by machine code from now on; False where there is none."""
+    """Compile a program: from now on ``run`` takes machine code. False where there is no compiler."""
     program.memo[_PREPARED] = machine_code(program) is not None
     return bool(program.memo[_PREPARED])
 

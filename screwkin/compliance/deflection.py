@@ -1,8 +1,8 @@
-"""Kernels of elastic joints: how far a robot on one frame yields under its weight.
+"""Programs of elastic joints: how far a robot on one frame deflects under its weight.
 
 The formulas of ``compliance.supported`` on graph scalars. Springs and weight are one symmetric matrix whose
-pattern is the tree seen from the support: eliminated from the far joints on, it fills nothing in, and its
-pivots tell whether the robot stands (Sylvester's law of inertia; Golub and Van Loan 2013, 4.1 and 11.1).
+pattern is the tree seen from the support: eliminated from the far joints on, it fills nothing in, and the
+signs of its pivots decide stability (Sylvester's law of inertia; Golub and Van Loan 2013, 4.1 and 11.1).
 """
 
 from __future__ import annotations
@@ -17,9 +17,11 @@ from screwkin.compliance.supported import Supported
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.model.robot import Robot
 
-SURE = 1e-6
+LEAST_PIVOT = 1e-6
 """Pivot, over what it is the difference of, from which its sign is beyond rounding."""
-ABOUT = "stable: 1 if springs and weight resist every further deflection; sure: 1 if that is beyond rounding"
+ABOUT = (
+    "stable: 1 if springs and weight resist every further deflection; certified: 1 if that is beyond rounding"
+)
 
 
 @kept
@@ -32,10 +34,10 @@ def linear(robot: Robot, support: str) -> Program:
     """
     recorder = Recorder(
         identifier(robot.name, support, "deflection"),
-        f"How the elastic joints of {robot.name} yield under its weight while {support} stands still, to"
+        f"How the elastic joints of {robot.name} deflect under its weight while {support} stands still, to"
         " first order: their deflections theta [rad], the base's pose after it, and the change of base and"
-        " tips [rotation vector; translation], world axes; residual: what lacks to equilibrium, norm of"
-        f" theta + torque / stiffness; {ABOUT}.",
+        " tips [rotation vector; translation], world axes; residual: norm of theta + torque / stiffness;"
+        f" {ABOUT}.",
     )
     T, q = pose_input(recorder, "T_world_base"), recorder.input("q", len(robot.joints))
     k, (gravity,) = recorder.input("stiffness", len(robot.joints)), recorder.input("gravity", 1)
@@ -43,22 +45,22 @@ def linear(robot: Robot, support: str) -> Program:
     theta = [-torque / x for torque, x in zip(here.gravity_torques(gravity), k, strict=True)]
     foot = here.pose(support)
     bent = _standing(robot, support, _sum(q, theta), foot.R.T @ here.up)
-    yields = [
+    twists = [
         sum((twist * theta[i] for i, twist in here.jacobian(frame).items()), start=NO_TWIST)
         for frame in frames(robot)
     ]
     pivots, _ = _eliminated(here, k, gravity, theta)
     recorder.output("theta", theta)
     recorder.output("T_world_base_after", matrix(T @ foot @ bent.pose(support).inverse), 4, 4)
-    recorder.output("change", [Twist(T.R @ x.omega, T.R @ x.v) for x in yields], len(yields), 6)
-    recorder.output("residual", [_lack(bent, theta, k, gravity)[1]])
+    recorder.output("change", [Twist(T.R @ x.omega, T.R @ x.v) for x in twists], len(twists), 6)
+    recorder.output("residual", [_residual(bent, theta, k, gravity)[1]])
     recorder.output("stable", [_stable(pivots)])
-    recorder.output("sure", [_sure(pivots)])
+    recorder.output("certified", [_certified(pivots)])
     return recorder.program()
 
 
 @kept
-def settling(robot: Robot, support: str) -> Program:
+def newton_step(robot: Robot, support: str) -> Program:
     """A step of Newton's method towards the equilibrium of springs and weight.
 
     Args:
@@ -66,27 +68,27 @@ def settling(robot: Robot, support: str) -> Program:
         support: the frame that stands still.
     """
     recorder = Recorder(
-        identifier(robot.name, support, "settling"),
+        identifier(robot.name, support, "newton_step"),
         f"A step of Newton's method towards the deflections theta at which springs carry {robot.name} while"
-        f" {support} stands still; lack: norm of theta + torque / stiffness before the step; {ABOUT}.",
+        f" {support} stands still; residual: norm of theta + torque / stiffness before the step; {ABOUT}.",
     )
     T, q = pose_input(recorder, "T_world_base"), recorder.input("q", len(robot.joints))
     theta = recorder.input("theta", len(robot.joints))
     k, (gravity,) = recorder.input("stiffness", len(robot.joints)), recorder.input("gravity", 1)
     foot = frame_pose(robot, link_displacements(robot, q), support)
     bent = _standing(robot, support, _sum(q, theta), foot.R.T @ _up(T))
-    r, lack = _lack(bent, theta, k, gravity)
+    r, norm = _residual(bent, theta, k, gravity)
     pivots, step = _eliminated(bent, k, gravity, [-x * y for x, y in zip(k, r, strict=True)])
-    recorder.output("lack", [lack])
+    recorder.output("residual", [norm])
     recorder.output("step", step)
     recorder.output("stable", [_stable(pivots)])
-    recorder.output("sure", [_sure(pivots)])
+    recorder.output("certified", [_certified(pivots)])
     return recorder.program()
 
 
 @kept
 def moved(robot: Robot, support: str) -> Program:
-    """Where base and tips are after a deflection, and by how much they have moved.
+    """Base pose after a deflection, and the displacement of base and tips.
 
     Args:
         robot: n joints, without loops of its own.
@@ -108,7 +110,7 @@ def moved(robot: Robot, support: str) -> Program:
 
 
 def frames(robot: Robot) -> tuple[str, ...]:
-    """Frames whose change is told, in their order."""
+    """Frames whose change is an output, in their order."""
     return ("base", *robot.tip_names)
 
 
@@ -122,18 +124,18 @@ def _up(T: Pose) -> Vector:
 
 
 def _standing(robot: Robot, support: str, q: Sequence[Scalar], up: Vector) -> Supported:
-    """The robot at q, told in the axes of its base, where screws have most zeros.
+    """The robot at q, expressed in the axes of its base, where screws have most zeros.
 
-    Its support sees the vertical ``up``.
+    ``up`` is the vertical in the axes of the support.
     """
     D = link_displacements(robot, q)
     return Supported(robot, support, IDENTITY, D, frame_pose(robot, D, support).R @ up)
 
 
-def _lack(
+def _residual(
     here: Supported, theta: Sequence[Scalar], k: Sequence[Scalar], gravity: Scalar
 ) -> tuple[list[Scalar], Scalar]:
-    """What lacks to equilibrium, theta + torque / k, and its norm."""
+    """theta + torque / k, zero in equilibrium, and its norm."""
     r = [x + torque / y for x, torque, y in zip(theta, here.gravity_torques(gravity), k, strict=True)]
     return r, sqrt(sum(x * x for x in r))
 
@@ -176,8 +178,8 @@ def _stable(pivots: Sequence[tuple[Scalar, Scalar]]) -> Scalar:
     return where(stable, 1.0, 0.0)
 
 
-def _sure(pivots: Sequence[tuple[Scalar, Scalar]]) -> Scalar:
-    sure: Scalar = True
+def _certified(pivots: Sequence[tuple[Scalar, Scalar]]) -> Scalar:
+    certified: Scalar = True
     for pivot, size in pivots:
-        sure = (abs_(pivot) > SURE * size) & sure
-    return where(sure, 1.0, 0.0)
+        certified = (abs_(pivot) > LEAST_PIVOT * size) & certified
+    return where(certified, 1.0, 0.0)

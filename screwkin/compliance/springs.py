@@ -23,16 +23,16 @@ def joint_stiffness(robot: Robot, stiffness: StiffnessChoice = None) -> Array:
             ``stiffness`` of the table's ``[servos]``, which may be either.
 
     Raises:
-        InputError: none is given, a joint has none, or one is not a positive finite number.
+        InputError: there is none, a joint has none, or one is not a positive finite number.
         UnknownNameError: no such joint.
     """
-    given: Any = robot.servos.get("stiffness") if stiffness is None else stiffness
-    if given is None:
+    chosen: Any = robot.servos.get("stiffness") if stiffness is None else stiffness
+    if chosen is None:
         raise InputError(
             f"{robot.name} has no joint stiffness; give one in N m/rad, or write stiffness under [servos] "
             "of its table"
         )
-    by_name = given if isinstance(given, Mapping) else {"default": given}
+    by_name = chosen if isinstance(chosen, Mapping) else {"default": chosen}
     for name in by_name:
         if name != "default" and name not in robot.joint_names:
             raise UnknownNameError("joint", name, robot.joint_names)

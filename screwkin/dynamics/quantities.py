@@ -1,160 +1,228 @@
-"""Positions, Jacobians and dynamics of the body."""
+"""Momentum, mass matrix, inverse dynamics and ground wrench of the whole body: every quantity once, here."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from screwkin.algebra.arrays import Array
-from screwkin.dynamics import body
-from screwkin.dynamics.newton_euler import GRAVITY
+from screwkin.algebra.screws import Wrench, wrench_at
+from screwkin.algebra.se3 import NO_TWIST, Pose, Twist, Vector
+from screwkin.dynamics import newton_euler
+from screwkin.dynamics.newton_euler import GRAVITY, Bodies
+from screwkin.dynamics.zmp import cart_table_zmp, zmp_from_wrench
 from screwkin.errors import InputError
-from screwkin.kinematics.arrays import checked, or_rest, told
+from screwkin.kinematics import mass
+from screwkin.kinematics.body import check_mass
+from screwkin.kinematics.formula import formula
+from screwkin.kinematics.kinds import Columns, Joints, Number
 from screwkin.model.robot import Robot
-from screwkin.model.state import State
 
 
-def link_poses(robot: Robot, state: State) -> Array:
-    """World pose of every link, by successive screw displacements.
+@formula
+def momentum(
+    robot: Robot, T_world_base: Pose, q: Joints, qd: Joints, base_twist: Twist | None = None
+) -> Wrench:
+    """Centroidal momentum of all links, world axes.
 
     Args:
-        robot: L links, n joints.
-        state: T_world_base (..., 4, 4) [m]; q (..., n) [rad or m].
+        robot: n joints, with masses.
+        state:
+        qd: joint rates [rad/s or m/s].
+        base_twist: [omega; v of the base origin], world axes [rad/s, m/s]; default: at rest.
 
     Returns:
-        (..., L, 4, 4), in ``robot.link_names`` order; a link's frame is its ``frame`` in the table.
+        (..., 6): [angular about the centre of mass; linear], N m s and N s.
 
     Raises:
-        ShapeError: wrong shape, NaN or infinity, or a base pose that is not rigid.
+        InputError: no link has a mass.
+        ShapeError: a wrong shape, NaN or infinity, or a base pose that is not rigid.
 
-    Source: paper A, eq. 2-3.
+    Example:
+        >>> import numpy as np
+        >>> import screwkin as sk
+        >>> robot = sk.load_robot(sk.robot_names()[0])
+        >>> h = sk.momentum(robot, sk.home(robot), np.zeros(18), [0, 0, 0, 1, 0, 0])
+        >>> bool(np.isclose(h[3], robot.mass))       # at 1 m/s along x
+        True
     """
-    return body.link_poses(robot, told=told(robot, state))["T_world_link"]
+    check_mass(robot)
+    bodies = Bodies.of(robot, T_world_base.R, q)
+    h = newton_euler.momentum(bodies, qd, base_twist or NO_TWIST)
+    return wrench_at(mass.center_of_mass(robot, bodies.poses), h)
 
 
-def frame_pose(robot: Robot, state: State, frame: str) -> Array:
-    """World pose (..., 4, 4) of ``base``, a link or a tip.
-
-    Raises:
-        UnknownNameError: no such frame; the message lists all frames.
-    """
-    robot.frame(frame)
-    return body.frame_pose(robot, frame, told=told(robot, state))["T_world_frame"]
-
-
-def jacobian(robot: Robot, state: State, frame: str, point: Any = None) -> Array:
-    """Screw Jacobian (..., 6, 6+n) of a frame, world axes, rows [omega; v at the point].
-
-    The first six columns multiply the base's twist **told at the same point** (they are the identity), the
-    others the joint rates; columns of joints off the frame's path are zero.
+@formula
+def mass_matrix(robot: Robot, T_world_base: Pose, q: Joints) -> Columns:
+    """Mass matrix of the floating body, by composite bodies.
 
     Args:
-        robot: the robot.
-        state: its configuration.
-        frame: ``base``, a link or a tip.
-        point: world point (..., 3) [m] at which twists are told; default: the frame's own origin.
-    """
-    robot.frame(frame)
-    at = {} if point is None else {"point": ("point", point, 3)}
-    return body.jacobian(robot, frame, point is None, told=told(robot, state, at))["J"]
+        robot: n joints, without loops of its own.
+        state:
 
-
-def center_of_mass(robot: Robot, state: State) -> Array:
-    """World position (..., 3) of the centre of mass [m].
+    Returns:
+        M (..., 6+n, 6+n) for [base twist [omega; v of the base origin], world axes; joint rates].
 
     Raises:
-        InputError: no link has a mass.
+        InputError: the robot has closures, which an open tree's mass matrix does not know.
+        ShapeError: a wrong shape, NaN or infinity, or a base pose that is not rigid.
+
+    Example:
+        >>> import numpy as np
+        >>> import screwkin as sk
+        >>> robot = sk.load_robot(sk.robot_names()[0])
+        >>> M = sk.mass_matrix(robot, sk.home(robot))
+        >>> bool(np.allclose(M, M.T) and np.isclose(M[3, 3], robot.mass))
+        True
+
+    Source: Featherstone (2008), section 6.2.
     """
-    _check_mass(robot)
-    return body.center_of_mass(robot, told=told(robot, state))["com"]
+    refuse_closures(robot, "the mass matrix")
+    return newton_euler.mass_matrix(Bodies.of(robot, T_world_base.R, q))
 
 
-def com_jacobian(robot: Robot, state: State) -> Array:
-    """Velocity of the CoM (..., 3, 6+n), world axes, per [base twist at the base origin; qd].
-
-    Raises:
-        InputError: no link has a mass.
-    """
-    _check_mass(robot)
-    return body.com_jacobian(robot, told=told(robot, state))["J"]
-
-
-def _check_mass(robot: Robot) -> None:
-    if not robot.mass > 0:
-        raise InputError(f"{robot.name} has no mass: every link of its table has mass 0, so it has no CoM")
-
-
-def momentum(robot: Robot, state: State, qd: Any, base_twist: Any = None) -> Array:
-    """Centroidal momentum (..., 6): [angular about the CoM; linear], world axes, N m s and N s.
-
-    Args:
-        robot: the robot.
-        state: its configuration.
-        qd: joint rates (..., n).
-        base_twist: [omega; v of the base origin] in world axes (..., 6); default at rest.
-
-    Raises:
-        InputError: no link has a mass.
-    """
-    _check_mass(robot)
-    moving = {
-        "qd": ("qd", qd, len(robot.joints)),
-        "base_twist": ("base_twist", or_rest(base_twist), 6),
-    }
-    return body.momentum(robot, told=told(robot, state, moving))["momentum"]
-
-
-def mass_matrix(robot: Robot, state: State) -> Array:
-    """Mass matrix (..., 6+n, 6+n) for [base twist at the base origin, world axes; qd]."""
-    return body.mass_matrix(robot, told=told(robot, state))["M"]
-
-
-def _moving(
-    robot: Robot, state: State, qd: Any, qdd: Any, base_twist: Any, base_acceleration: Any, gravity: Any
-) -> dict[str, Array]:
-    n = len(robot.joints)
-    moving = {
-        "qd": ("qd", qd, n),
-        "qdd": ("qdd", qdd, n),
-        "base_twist": ("base_twist", or_rest(base_twist), 6),
-        "base_acceleration": ("base_acceleration", or_rest(base_acceleration), 6),
-        "gravity": ("gravity", checked("gravity", gravity)[..., None], 1),
-    }
-    return told(robot, state, moving)
-
-
+@formula
 def inverse_dynamics(
     robot: Robot,
-    state: State,
-    qd: Any,
-    qdd: Any,
-    base_twist: Any = None,
-    base_acceleration: Any = None,
-    gravity: Any = GRAVITY,
-) -> Array:
-    """Generalised force (..., 6+n): wrench [m; f] on the base about its origin (world axes), joint torques.
+    T_world_base: Pose,
+    q: Joints,
+    qd: Joints,
+    qdd: Joints,
+    base_twist: Twist | None = None,
+    base_acceleration: Twist | None = None,
+    gravity: Number = GRAVITY,
+) -> tuple[Any, ...]:
+    """Generalised force that a motion needs: wrench on the base and joint efforts (recursive Newton-Euler).
 
     Args:
-        robot: the robot.
-        state: its configuration.
-        qd: joint rates (..., n).
-        qdd: joint accelerations (..., n).
-        base_twist: [omega; v of the base origin], world axes (..., 6); default zero.
-        base_acceleration: its time derivative [alpha; a]; default zero.
-        gravity: [m/s^2], along -z of the world; a number, or one for every sample (...,).
+        robot: n joints, without loops of its own.
+        state:
+        qd: joint rates [rad/s or m/s].
+        qdd: joint accelerations [rad/s^2 or m/s^2].
+        base_twist: [omega; v of the base origin], world axes; default: zero.
+        base_acceleration: its time derivative [alpha; a]; default: zero.
+        gravity: [m/s^2], along -z of the world; a number, or one for every sample.
+
+    Returns:
+        (..., 6+n): wrench [m; f] on the base about its origin, world axes [N m, N]; joint efforts [N m or N].
+
+    Raises:
+        InputError: the robot has closures, which the open tree's efforts do not know.
+        ShapeError: a wrong shape, NaN or infinity, or a base pose that is not rigid.
+
+    Example:
+        >>> import numpy as np
+        >>> import screwkin as sk
+        >>> robot, rest = sk.load_robot(sk.robot_names()[0]), np.zeros(18)
+        >>> force = sk.inverse_dynamics(robot, sk.home(robot), rest, rest)
+        >>> bool(np.isclose(force[5], 9.81 * robot.mass))      # held up by its base
+        True
+
+    Source: Featherstone (2008), section 5.3.
     """
-    moving = _moving(robot, state, qd, qdd, base_twist, base_acceleration, gravity)
-    return body.inverse_dynamics(robot, told=moving)["force"]
+    refuse_closures(robot, "inverse dynamics")
+    wrench, efforts = newton_euler.inverse_dynamics(
+        Bodies.of(robot, T_world_base.R, q),
+        qd,
+        qdd,
+        base_twist or NO_TWIST,
+        base_acceleration or NO_TWIST,
+        gravity,
+    )
+    return (wrench, *efforts)
 
 
+@formula
 def ground_wrench(
     robot: Robot,
-    state: State,
-    qd: Any,
-    qdd: Any,
-    base_twist: Any,
-    base_acceleration: Any,
-    gravity: Any = GRAVITY,
-) -> Array:
-    """Wrench (..., 6) that the ground must give, [m; f] about the world origin, world axes."""
-    moving = _moving(robot, state, qd, qdd, base_twist, base_acceleration, gravity)
-    return body.ground_wrench(robot, told=moving)["wrench"]
+    T_world_base: Pose,
+    q: Joints,
+    qd: Joints,
+    qdd: Joints,
+    base_twist: Twist | None = None,
+    base_acceleration: Twist | None = None,
+    gravity: Number = GRAVITY,
+) -> Wrench:
+    """Wrench that the ground exerts on a robot that moves: rate of its momentum less its weight.
+
+    Args:
+        robot: n joints, with masses.
+        state:
+        qd: joint rates [rad/s or m/s].
+        qdd: joint accelerations [rad/s^2 or m/s^2].
+        base_twist: [omega; v of the base origin], world axes; default: zero.
+        base_acceleration: its time derivative [alpha; a]; default: zero.
+        gravity: [m/s^2], along -z of the world; a number, or one for every sample.
+
+    Returns:
+        (..., 6): [m; f] about the world origin, world axes [N m, N].
+
+    Raises:
+        ShapeError: a wrong shape, NaN or infinity, or a base pose that is not rigid.
+
+    Example:
+        >>> import numpy as np
+        >>> import screwkin as sk
+        >>> robot, rest = sk.load_robot(sk.robot_names()[0]), np.zeros(18)
+        >>> wrench = sk.ground_wrench(robot, sk.home(robot), rest, rest)
+        >>> bool(np.isclose(wrench[5], 9.81 * robot.mass))
+        True
+    """
+    bodies = Bodies.of(robot, T_world_base.R, q)
+    wrench = newton_euler.ground_wrench(
+        bodies, qd, qdd, base_twist or NO_TWIST, base_acceleration or NO_TWIST, gravity
+    )
+    return wrench_at(-T_world_base.p, wrench)
+
+
+@formula
+def balance(
+    robot: Robot,
+    T_world_base: Pose,
+    q: Joints,
+    qd: Joints,
+    qdd: Joints,
+    base_twist: Twist,
+    base_acceleration: Twist,
+) -> dict[str, Any]:
+    """Centre of mass, centroidal momentum, ground wrench, ZMP and cart-table ZMP of a motion, world axes.
+
+    Args:
+        robot: n joints, with masses.
+        state:
+        qd: joint rates [rad/s or m/s].
+        qdd: joint accelerations [rad/s^2 or m/s^2].
+        base_twist: [omega; v of the base origin], world axes.
+        base_acceleration: its time derivative.
+
+    Returns:
+        ``com`` (..., 3) [m], ``momentum`` (..., 6) as ``momentum`` does, ``wrench`` (..., 6) as
+        ``ground_wrench`` does, ``zmp`` and ``cart_table`` (..., 2) [m].
+    """
+    check_mass(robot)
+    bodies = Bodies.of(robot, T_world_base.R, q)
+    wrench = newton_euler.ground_wrench(bodies, qd, qdd, base_twist, base_acceleration, GRAVITY)
+    local = mass.center_of_mass(robot, bodies.poses)
+    com = T_world_base.p + local
+    rise = wrench.f * (1.0 / robot.mass)
+    cart = cart_table_zmp(com, Vector(rise.x, rise.y, rise.z - GRAVITY), GRAVITY)
+    zmp = zmp_from_wrench(wrench, T_world_base.p)
+    return {
+        "com": com,
+        "momentum": wrench_at(local, newton_euler.momentum(bodies, qd, base_twist)),
+        "wrench": wrench_at(-T_world_base.p, wrench),
+        "zmp": [zmp.x, zmp.y],
+        "cart_table": [cart.x, cart.y],
+    }
+
+
+def refuse_closures(robot: Robot, what: str) -> None:
+    """Refuse a robot with loops of its own where only its open tree would be seen.
+
+    Raises:
+        InputError: it has closures.
+    """
+    if robot.closures:
+        names = ", ".join(closure.name for closure in robot.closures)
+        raise InputError(
+            f"{what} of {robot.name} would be that of its open tree, without its closures ({names}). Solve "
+            "the loops for rates with secondary_rates; forces in loops are not computed yet"
+        )

@@ -9,7 +9,9 @@ from screwkin.algebra.se3 import Vector
 def zmp_from_wrench(wrench: Wrench, origin: Vector) -> Vector:
     """Point of the floor z = 0 where the ground wrench has no horizontal moment.
 
-    ``wrench`` is told in world axes about ``origin`` [m].
+    Args:
+        wrench: of the ground [N m, N], expressed in world axes about ``origin``.
+        origin: in the world [m].
     """
     below = Vector(0.0, 0.0, -origin.z)
     foot = wrench_at(below, wrench)

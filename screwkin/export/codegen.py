@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -13,13 +14,14 @@ from screwkin.compiler.program import Group, Program
 from screwkin.compiler.records import identifier
 from screwkin.compiler.run import run
 from screwkin.compliance import deflection
-from screwkin.dynamics import body
 from screwkin.dynamics.margin import margin
 from screwkin.dynamics.newton_euler import GRAVITY
 from screwkin.errors import InputError, UnknownNameError
+from screwkin.export.quantities import QUANTITIES, programs
 from screwkin.ik import programs as limbs
+from screwkin.ik.closed import recognised
 from screwkin.kinematics.positions import frame_pose, link_displacements
-from screwkin.kinematics.serial_chain import Chain
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.tip_motion import follows, motion
 from screwkin.model.robot import Robot
 
@@ -28,7 +30,8 @@ TOLERANCE: Mapping[Real, float] = {"double": 1e-12, "float": 1e-5}
 
 
 def _closed_limbs(robot: Robot) -> list[Program]:
-    return [limbs.limb_nearest(robot, x.name) for x in robot.limbs if limbs.solvable(robot, x.tip, True)]
+    solved = [x.name for x in robot.limbs if recognised(SerialChain.of(robot, x.name))]
+    return [limbs.limb_nearest(robot, name) for name in solved]
 
 
 def _rates(accelerations: bool) -> Callable[[Robot], list[Program]]:
@@ -51,30 +54,24 @@ def _deflections(robot: Robot) -> list[Program]:
     return [deflection.linear(robot, support) for support in legs or ["base"]]
 
 
-def _weighing(make: Callable[[Robot], Program]) -> Callable[[Robot], list[Program]]:
-    def made(robot: Robot) -> list[Program]:
-        if not robot.mass > 0:
-            raise InputError(f"{robot.name} has no mass, so it has neither a centre of mass nor a ZMP")
-        return [make(robot)]
-
-    return made
-
-
+SHORT = {
+    "tips": "tip_poses",
+    "links": "link_poses",
+    "com": "center_of_mass",
+    "jacobian": "limb_jacobian",
+    "zmp": "balance",
+}
+"""Short names of quantities."""
 KINDS: Mapping[str, Callable[[Robot], list[Program]]] = {
-    "tips": lambda robot: [body.tip_poses.program(robot)] if robot.limbs else [],
-    "links": lambda robot: [body.link_poses.program(robot)],
-    "jacobian": lambda robot: [body.limb_jacobian.program(robot, x.name) for x in robot.limbs],
-    "com": _weighing(body.center_of_mass.program),
-    "mass_matrix": _weighing(body.mass_matrix.program),
-    "inverse_dynamics": _weighing(body.inverse_dynamics.program),
+    **{name: partial(programs, name=name) for name in QUANTITIES if name not in SHORT.values()},
+    **{short: partial(programs, name=name) for short, name in SHORT.items()},
     "rates": _rates(False),
     "motion": _rates(True),
-    "zmp": _weighing(body.balance.program),
     "ik": _closed_limbs,
     "margin": lambda robot: [margin(robot)],
     "deflection": _deflections,
 }
-"""What can be asked for."""
+"""What can be asked for: quantities, and what algorithms are made of."""
 
 
 def programs_of(robot: Robot, kinds: Sequence[str]) -> list[Program]:
@@ -133,7 +130,7 @@ def example(robot: Robot, program: Program) -> dict[str, Array]:
         pose = as_array(frame_pose(robot, D, limb.tip))
         told[identifier("T_world", limb.tip)] = T @ pose
         if program.name == identifier(robot.name, limb.name, "nearest"):
-            told |= {"T_base_tip": pose, "guess": home[list(Chain.of(robot, limb.name).joints)]}
+            told |= {"T_base_tip": pose, "guess": home[list(SerialChain.of(robot, limb.name).joints)]}
     return {g.name: told[g.name] if g.name in told else rng.uniform(-1, 1, g.shape) for g in program.inputs}
 
 

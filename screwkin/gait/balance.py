@@ -10,18 +10,17 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.pytrees import pytree
 from screwkin.compiler.run import run
-from screwkin.dynamics.body import balance
-from screwkin.dynamics.margin import support_margin_fast
+from screwkin.dynamics.margin import support_margin
+from screwkin.dynamics.quantities import balance
 from screwkin.dynamics.support import Spike, sole_corners, spikes
-from screwkin.errors import InputError
 from screwkin.model.robot import Robot
-from screwkin.trajectory import Trajectory
+from screwkin.trajectory import Trajectory, check_joints
 
 
 @dataclass(frozen=True, eq=False)
 @pytree("spikes")
 class Balance:
-    """ZMP and what belongs to it, over T samples.
+    """ZMP, its margin and the ground wrench, over T samples.
 
     Attributes:
         zmp: (T, 2) from the multibody ground wrench [m].
@@ -71,14 +70,14 @@ def ground_reaction(
         twist: [omega; v of the base origin] (T, 6), world axes.
         acceleration: its time derivative (T, 6).
     """
-    told = {"T_world_base": T_world_base, "q": q, "qd": qd, "qdd": qdd}
-    told |= {"base_twist": twist, "base_acceleration": acceleration}
-    found = run(balance.program(robot), told)
-    return found["zmp"], found["com"], found["wrench"], found["cart_table"]
+    inputs = {"T_world_base": T_world_base, "q": q, "qd": qd, "qdd": qdd}
+    inputs |= {"base_twist": twist, "base_acceleration": acceleration}
+    out = run(balance.program(robot), inputs)
+    return out["zmp"], out["com"], out["wrench"], out["cart_table"]
 
 
 def ground_margin(zmp: Array, com: Array, wrench: Array, soles: Array, contact: Array) -> Array:
-    """Margin (T,) of the ZMP within the bearing soles; where they would have to pull, minus the CoM's height.
+    """Margin (T,) of the ZMP in the support polygon [m]; where soles would pull, minus the CoM's height.
 
     Args:
         zmp: (T, 2) [m].
@@ -87,23 +86,24 @@ def ground_margin(zmp: Array, com: Array, wrench: Array, soles: Array, contact: 
         soles: (T, feet, corners, 2) [m].
         contact: (T, feet).
     """
-    margin = support_margin_fast(zmp, soles, contact)
+    margin = support_margin(zmp, soles, contact)
     return np.where(wrench[:, 5] > 0, margin, np.minimum(margin, 0.0) - np.abs(com[:, 2]))
 
 
 def zmp(robot: Robot, trajectory: Trajectory) -> Balance:
-    """CoM, ZMP, margin and spikes of a trajectory, computed anew from its positions, rates and accelerations.
+    """CoM, ZMP, margin and spikes of a trajectory, recomputed from its positions, rates and accelerations.
+
+    Args:
+        robot: n joints; every foot of the trajectory has a sole.
+        trajectory: T samples.
+
+    Returns:
+        Balance, lengths in [m], world axes.
 
     Raises:
         InputError: the joints are not those of the robot, or a foot has no sole.
     """
-    if trajectory.joint_names != robot.joint_names:
-        lacking = [name for name in robot.joint_names if name not in trajectory.joint_names]
-        foreign = [name for name in trajectory.joint_names if name not in robot.joint_names]
-        found = [f"it lacks {', '.join(lacking)}"] if lacking else []
-        found += [f"it has the foreign {', '.join(foreign)}"] if foreign else []
-        told = " and ".join(found) or "they stand in another order"
-        raise InputError(f"the trajectory's joints are not those of {robot.name}: {told}")
+    check_joints(robot, trajectory.joint_names)
     point, com, wrench, cart = ground_reaction(
         robot,
         trajectory.T_world_base,

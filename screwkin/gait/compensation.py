@@ -1,13 +1,13 @@
-"""Compensation of elastic servos: commands that make a yielding robot go where the plan has it.
+"""Compensation of elastic servos: commands that make a compliant robot follow the planned motion.
 
-A servo told q stands at q + theta, bent by the weight that it carries (``dynamics/stiffness.py``). Two
-remedies, both computed from statics before the walk:
+A servo commanded q stands at q + theta, bent by the weight that it carries (``compliance.stiffness``). Two
+remedies, both computed before the walk:
 
-- ``swing``, the published one: while one foot bears, what the other foot would miss its target by is
-  subtracted from the target, and the leg's joints follow by inverse kinematics. The robot still sinks and
-  leans; only the foot in the air is put right.
-- ``joint``: every joint is told q - theta. Posture and both feet are put right. While both feet bear, the
-  deflections of standing on either are blended by the share of the load, so that no command jumps.
+- ``swing``, the published one: in single support the position error of the other foot is subtracted from its
+  target, and the leg's joints follow by inverse kinematics. The robot still sinks and leans; only the foot in
+  the air is corrected.
+- ``joint``: every joint is commanded q - theta. Posture and both feet are corrected. In double support the
+  deflections of standing on either foot are blended by the load distribution, so that no command jumps.
 
 In statics the robot stands still on a foot that its CoM is not above, and the ankle must hold it; in a walk
 the ZMP is there. The model ``dynamic`` takes the torques of the walk itself and is free of that error.
@@ -32,12 +32,13 @@ from screwkin.compliance.stiffness import Deflection, static_deflection
 from screwkin.compliance.stiffness import Method as StaticModel
 from screwkin.errors import InputError, LimitError, NoSolutionError
 from screwkin.gait.feed_forward import walking_torques
-from screwkin.gait.loads import load_shares
-from screwkin.ik.whole_body import solve_samples
+from screwkin.gait.loads import load_distribution
+from screwkin.ik.pose import solve_pose
+from screwkin.kinematics.limits import excess, limits_of, within, worst_joint
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
-from screwkin.trajectory import Trajectory
+from screwkin.trajectory import Trajectory, check_joints
 
 Method = Literal["swing", "joint"]
 Model = Literal["linear", "nonlinear", "dynamic"]
@@ -51,8 +52,6 @@ WAYS: Mapping[Way, tuple[Method, Model]] = {
     "dynamic": ("joint", "dynamic"),
 }
 """Method and model by name: the foot in the air, all joints by statics, all joints by the walk's torques."""
-LIMIT_SLACK = 1e-9
-"""How far rounding may take a joint beyond its limits [rad or m]."""
 
 
 def compensate(
@@ -66,18 +65,18 @@ def compensate(
     """The trajectory with commands that allow for the servos' deflection under the robot's weight.
 
     Args:
-        robot: of which the trajectory speaks.
-        trajectory: what the robot is to do.
+        robot: the trajectory's robot, n joints.
+        trajectory: the planned motion, T samples.
         stiffness: of the joints, see ``joint_stiffness``.
         method: ``swing`` moves the target of the foot in the air; ``joint`` commands q - theta.
-        passes: how often what is still missing is predicted and subtracted.
-        model: how deflections are predicted. For ``joint``, ``linear`` takes the torques of the intended
+        passes: how often the remaining error is predicted and subtracted.
+        model: how deflections are predicted. For ``joint``, ``linear`` takes the torques of the planned
             posture; the compensated robot stands in it, so that the first pass is exact already. ``dynamic``,
-            for ``joint`` only, takes those of the intended motion, and needs no further pass either.
+            for ``joint`` only, takes those of the planned motion, and needs no further pass either.
 
     Returns:
-        Trajectory with the commanded ``q`` and ``qd``; all other fields stay those of the intended motion.
-        ``meta["compensation"]`` tells how it was made.
+        Trajectory with the commanded ``q`` and ``qd``; all other fields stay those of the planned motion.
+        ``meta["compensation"]`` holds method, model, passes and stiffness.
 
     Raises:
         NoSolutionError: the joints are too soft for the robot's weight. UnreachableError, SingularError,
@@ -88,14 +87,14 @@ def compensate(
     *_, last = _commands(robot, trajectory, stiffness, method, passes, model)
     q = trajectory.q + last
     _check_limits(robot, trajectory, q)
-    told = {
+    choices = {
         "method": method,
         "model": model,
         "passes": int(passes),
         "stiffness": dict(zip(robot.joint_names, k.tolist(), strict=True)),
     }
     qd = trajectory.qd + change_rates(trajectory.time, last)
-    return replace(trajectory, q=q, qd=qd, meta={**trajectory.meta, "compensation": told})
+    return replace(trajectory, q=q, qd=qd, meta={**trajectory.meta, "compensation": choices})
 
 
 @dataclass(frozen=True)
@@ -120,18 +119,18 @@ def convergence(
     method: Method = "swing",
     model: StaticModel = "nonlinear",
 ) -> tuple[Remaining, ...]:
-    """What every pass of a compensation leaves of the swing foot's position error; row 0 is without any.
+    """Remaining position error of the swing foot after every pass of a compensation; row 0 is without any.
 
-    Arguments and errors as of ``compensate``. The error is measured while one foot bears: the place of the
-    other foot's tip in the nonlinear equilibrium, against the intended one, with the bearing foot in place.
+    Arguments and errors as of ``compensate``. The error is measured in single support: the position of the
+    other foot's tip in the nonlinear equilibrium, less the planned one, with the stance foot in place.
     """
     rows: list[Remaining] = []
     if model not in ("linear", "nonlinear"):
         raise InputError(f"model {model!r} knows no static equilibrium; valid: linear, nonlinear")
     for change in _commands(robot, trajectory, stiffness, method, passes, model):
-        missed = 1e3 * _swing_errors(robot, trajectory, trajectory.q + change, stiffness, "nonlinear")
-        x, y, z = np.abs(missed).max(axis=(0, 1)).tolist()
-        norm = float(np.linalg.norm(missed, axis=-1).max())
+        error = 1e3 * _swing_errors(robot, trajectory, trajectory.q + change, stiffness, "nonlinear")
+        x, y, z = np.abs(error).max(axis=(0, 1)).tolist()
+        norm = float(np.linalg.norm(error, axis=-1).max())
         first = rows[0].norm_mm if rows else norm
         rows.append(Remaining(len(rows), (x, y, z), norm, 1.0 - norm / first if first else 0.0))
     return tuple(rows)
@@ -147,8 +146,11 @@ def _commands(
 ) -> Iterator[Array]:
     """What is added to the joint positions (T, n): nothing, then after each pass."""
     _check_choices(method, passes, model)
-    _check_fit(robot, trajectory)
-    shares = load_shares(trajectory)
+    check_joints(robot, trajectory.joint_names)
+    strange = [foot for foot in trajectory.feet if foot not in robot.tip_names]
+    if strange:
+        raise InputError(f"the trajectory's feet {', '.join(strange)} are no tips of {robot.name}")
+    shares = load_distribution(trajectory)
     change = np.zeros_like(trajectory.q)
     yield change
     shifts = np.zeros((trajectory.samples, len(trajectory.feet), 3))
@@ -159,8 +161,7 @@ def _commands(
             at = trajectory.q if model == "linear" else trajectory.q + change
             change = -_blended_deflection(robot, trajectory, shares, at, stiffness, model)
         else:
-            missed = _swing_errors(robot, trajectory, trajectory.q + change, stiffness, model)
-            shifts = shifts - missed
+            shifts = shifts - _swing_errors(robot, trajectory, trajectory.q + change, stiffness, model)
             change = _reached(robot, trajectory, shifts, trajectory.q + change) - trajectory.q
         yield change
 
@@ -177,42 +178,39 @@ def _blended_deflection(
     theta = np.zeros_like(q)
     for i, share in enumerate(shares.T):
         rows = np.flatnonzero(share > 0)
-        yielded = _deflected(robot, trajectory, q, i, rows, stiffness, model)
-        theta[rows] += share[rows, None] * yielded.theta
+        theta[rows] += share[rows, None] * _deflection(robot, trajectory, q, i, rows, stiffness, model).theta
     return theta
 
 
 def _swing_errors(
     robot: Robot, trajectory: Trajectory, q: Array, stiffness: StiffnessChoice, model: StaticModel
 ) -> Array:
-    """Where feet in the air are, less where they should be, (T, feet, 3) [m]; 0 for feet that bear."""
-    missed = np.zeros((trajectory.samples, len(trajectory.feet), 3))
+    """Position errors of feet in the air (T, feet, 3) [m]: deflected less planned; 0 for feet in contact."""
+    errors = np.zeros((trajectory.samples, len(trajectory.feet), 3))
     alone = trajectory.contact.sum(axis=1) == 1
     for i in range(len(trajectory.feet)):
         rows = np.flatnonzero(alone & trajectory.contact[:, i])
         if not len(rows):
             continue
-        yielded = _deflected(robot, trajectory, q, i, rows, stiffness, model)
+        bent = _deflection(robot, trajectory, q, i, rows, stiffness, model)
+        T = pose_from_array(_standing(robot, trajectory, q, i, rows).T_world_base)
+        D = link_displacements(robot, unstack(q[rows]))
         for j, foot in enumerate(trajectory.feet):
             if j != i:
-                wanted = trajectory.T_world_tip[foot][rows, :3, 3]
-                missed[rows, j] = yielded.before[foot] + yielded.of(foot) - wanted
-    return missed
+                before = as_array((T @ frame_pose(robot, D, foot)).p, (len(rows),))
+                errors[rows, j] = before + bent.of(foot)[:, 3:] - trajectory.T_world_tip[foot][rows, :3, 3]
+    return errors
 
 
-@dataclass(frozen=True, eq=False)
-class _Yielded:
-    """Deflections theta (B, n), and where the feet are before, and by how much they move, (B, 3) [m]."""
-
-    theta: Array
-    before: dict[str, Array]
-    change: Deflection
-
-    def of(self, foot: str) -> Array:
-        return np.asarray(self.change.of(foot)[:, 3:])
+def _standing(robot: Robot, trajectory: Trajectory, q: Array, foot: int, rows: NDArray[np.intp]) -> State:
+    """The robot commanded q[rows] (B, n) on one foot, which stands where the trajectory has it."""
+    stance = trajectory.feet[foot]
+    own = frame_pose(robot, link_displacements(robot, unstack(q[rows])), stance)
+    base = pose_from_array(trajectory.T_world_tip[stance][rows]) @ own.inverse
+    return State(as_array(base, (len(rows),)), q[rows])
 
 
-def _deflected(
+def _deflection(
     robot: Robot,
     trajectory: Trajectory,
     q: Array,
@@ -220,22 +218,18 @@ def _deflected(
     rows: NDArray[np.intp],
     stiffness: StiffnessChoice,
     model: StaticModel,
-) -> _Yielded:
-    """The robot commanded q[rows] (B, n) on one foot, which stands where the trajectory has it."""
-    D = link_displacements(robot, unstack(q[rows]))
-    feet = {name: frame_pose(robot, D, name) for name in trajectory.feet}
-    stands = trajectory.feet[foot]
-    base = pose_from_array(trajectory.T_world_tip[stands][rows]) @ feet[stands].inverse
-    batch = (len(rows),)
-    found = static_deflection(robot, State(as_array(base, batch), q[rows]), stands, stiffness, model)
-    bad = rows[~(found.converged & found.stable)]
+) -> Deflection:
+    """Deflections (B, ...) of the robot commanded q[rows] on one foot, all of them stable equilibria."""
+    stance = trajectory.feet[foot]
+    state = _standing(robot, trajectory, q, foot, rows)
+    bent = static_deflection(robot, state, stance, stiffness, model)
+    bad = rows[~(bent.converged & bent.stable)]
     if len(bad):
         raise NoSolutionError(
-            f"t = {trajectory.time[bad[0]]:.3f} s: standing on {stands} the joints are too soft for the "
+            f"t = {trajectory.time[bad[0]]:.3f} s: standing on {stance} the joints are too soft for the "
             f"robot's weight: no stable equilibrium in {len(bad)} of {len(rows)} samples. Raise the stiffness"
         )
-    places = {name: as_array((base @ pose).p, batch) for name, pose in feet.items()}
-    return _Yielded(np.asarray(found.theta), places, found)
+    return bent
 
 
 def _reached(robot: Robot, trajectory: Trajectory, shifts: Array, guess: Array) -> Array:
@@ -244,7 +238,7 @@ def _reached(robot: Robot, trajectory: Trajectory, shifts: Array, guess: Array) 
     for i, foot in enumerate(trajectory.feet):
         targets[foot] = trajectory.T_world_tip[foot].copy()
         targets[foot][:, :3, 3] += shifts[:, i]
-    solution = solve_samples(robot, targets, State(trajectory.T_world_base, guess))
+    solution = solve_pose(robot, targets, State(trajectory.T_world_base, guess))
     solution.raise_on_failure(robot, trajectory.time)
     moved = (shifts != 0).any(axis=(1, 2))[:, None]
     return np.where(moved, solution.state.q, guess)
@@ -258,11 +252,10 @@ def change_rates(time: Array, change: Array) -> Array:
 
 
 def _check_limits(robot: Robot, trajectory: Trajectory, q: Array) -> None:
-    lower = np.array([joint.lower for joint in robot.joints])
-    upper = np.array([joint.upper for joint in robot.joints])
-    beyond = np.maximum(lower - q, q - upper)
-    if beyond.max() > LIMIT_SLACK:
-        row, i = (int(x) for x in np.unravel_index(np.argmax(beyond), beyond.shape))
+    lower, upper = limits_of(robot)
+    if not within(q, lower, upper).all():
+        row = int(excess(q, lower, upper).argmax())
+        i = int(worst_joint(q[row], lower, upper))
         factor, unit = (1e3, "mm") if robot.joints[i].type == "prismatic" else (180 / np.pi, "deg")
         raise LimitError(
             f"t = {trajectory.time[row]:.3f} s: {robot.joints[i].name} is compensated to "
@@ -275,22 +268,22 @@ def way_of(trajectory: Trajectory) -> Way | Literal["none"]:
     """How a trajectory is compensated, by name.
 
     Raises:
-        InputError: its ``meta`` tells something else.
+        InputError: its ``meta`` names another way.
     """
-    told = trajectory.meta.get("compensation")
-    if told is None:
+    entry = trajectory.meta.get("compensation")
+    if entry is None:
         return "none"
-    found = (told.get("method"), told.get("model")) if isinstance(told, Mapping) else (None, None)
+    own = (entry.get("method"), entry.get("model")) if isinstance(entry, Mapping) else (None, None)
     for way, (method, model) in WAYS.items():
-        if found[0] == method and (found[1] == "dynamic") == (model == "dynamic"):
+        if own[0] == method and (own[1] == "dynamic") == (model == "dynamic"):
             return way
-    raise InputError(f"meta tells of a compensation {told!r} that is not known; valid: {', '.join(WAYS)}")
+    raise InputError(f"meta names a compensation {entry!r} that is not known; valid: {', '.join(WAYS)}")
 
 
 def stiffness_of(trajectory: Trajectory) -> StiffnessChoice:
     """The joints' stiffness that a trajectory is compensated for; None if it is not."""
-    told = trajectory.meta.get("compensation")
-    given = told.get("stiffness") if isinstance(told, Mapping) else None
+    entry = trajectory.meta.get("compensation")
+    given = entry.get("stiffness") if isinstance(entry, Mapping) else None
     return dict(given) if isinstance(given, Mapping) else None
 
 
@@ -302,14 +295,3 @@ def _check_choices(method: str, passes: object, model: str) -> None:
         raise InputError("model 'dynamic' is for method 'joint'; a foot's target is corrected by statics")
     if isinstance(passes, bool) or not isinstance(passes, numbers.Integral) or passes < 1:
         raise InputError(f"passes is {passes!r}; it must be a whole number of at least 1")
-
-
-def _check_fit(robot: Robot, trajectory: Trajectory) -> None:
-    if trajectory.joint_names != robot.joint_names:
-        strange = sorted(set(trajectory.joint_names) ^ set(robot.joint_names))
-        raise InputError(
-            f"the trajectory's joints are not those of {robot.name}: {', '.join(strange) or 'other order'}"
-        )
-    strange = [foot for foot in trajectory.feet if foot not in robot.tip_names]
-    if strange:
-        raise InputError(f"the trajectory's feet {', '.join(strange)} are no tips of {robot.name}")

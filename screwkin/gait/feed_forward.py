@@ -1,8 +1,8 @@
-"""Torques that a walk needs of its joints, weight and motion together, also while both feet bear.
+"""Joint torques of a walk, weight and motion together, also in double support.
 
-On one foot they are settled by the motion. On two, forces between the feet are free to choose; here each foot
-bears its share of the load, and lies to its centre of pressure as both feet's balance point lies to the ZMP.
-So neither ankle twists against the other, and torques pass without a jump into those of single support.
+On one foot the motion determines them. On two, forces between the feet are free to choose; here each foot
+carries its share of the load, and lies to its centre of pressure as both feet's balance point lies to the
+ZMP. So neither ankle twists against the other, and torques pass without a jump into those of single support.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from screwkin.algebra.se3 import (
     vector_from_array,
 )
 from screwkin.dynamics.newton_euler import GRAVITY, Bodies, inverse_dynamics
-from screwkin.gait.loads import load_shares
+from screwkin.gait.loads import load_distribution
 from screwkin.model.robot import Robot
 from screwkin.trajectory import Trajectory
 
@@ -31,10 +31,14 @@ def walking_torques(robot: Robot, trajectory: Trajectory) -> Array:
     With shares s of the load and feet at a and b, the first foot gets the share s_a of the ground wrench,
     moved by s_b (a - b), and the second the share s_b, moved by s_a (b - a): together the whole.
 
+    Args:
+        robot: n joints.
+        trajectory: T samples, with two feet.
+
     Raises:
-        InputError: other than two feet, or a sample in which none bears.
+        InputError: other than two feet, or a sample in which none is in contact.
     """
-    shares, batch = load_shares(trajectory), (trajectory.samples,)
+    shares, batch = load_distribution(trajectory), (trajectory.samples,)
     bodies = Bodies.of(robot, pose_from_array(trajectory.T_world_base).R, unstack(trajectory.q))
     ground, free = inverse_dynamics(
         bodies,
@@ -48,7 +52,7 @@ def walking_torques(robot: Robot, trajectory: Trajectory) -> Array:
     places = [vector_from_array(trajectory.T_world_tip[foot][:, :3, 3]) for foot in trajectory.feet]
     for i, foot in enumerate(trajectory.feet):
         away = (places[i] - places[1 - i]) * shares[:, 1 - i]
-        borne = Wrench(ground.m + cross(away, ground.f), ground.f) * shares[:, i]
+        carried = Wrench(ground.m + cross(away, ground.f), ground.f) * shares[:, i]
         for j in robot.path_to(robot.limb(foot).link):
-            torque[:, j] -= as_array(power(borne, bodies.twists[j]), batch)
+            torque[:, j] -= as_array(power(carried, bodies.twists[j]), batch)
     return torque

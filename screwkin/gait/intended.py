@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from screwkin.gait.compensation import change_rates
-from screwkin.ik.whole_body import solve_samples
+from screwkin.ik.pose import solve_pose
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 from screwkin.trajectory import Trajectory
@@ -29,7 +29,7 @@ def intended(robot: Robot, trajectory: Trajectory) -> Trajectory:
         pose = trajectory.T_world_tip[limb.tip]
         whole = limb.tip in trajectory.feet or len(robot.path_to(limb.link)) >= _ALL
         targets[limb.tip] = pose if whole else pose[:, :3, 3]
-    solution = solve_samples(robot, targets, State(trajectory.T_world_base, trajectory.q))
+    solution = solve_pose(robot, targets, State(trajectory.T_world_base, trajectory.q))
     solution.raise_on_failure(robot, trajectory.time)
     q = solution.state.q
     return replace(trajectory, q=q, qd=trajectory.qd - change_rates(trajectory.time, trajectory.q - q))

@@ -1,4 +1,4 @@
-"""How feet share the robot's weight along a trajectory."""
+"""Load distribution between two feet along a trajectory."""
 
 from __future__ import annotations
 
@@ -9,25 +9,32 @@ from screwkin.algebra.arrays import Array
 from screwkin.errors import InputError
 from screwkin.trajectory import Trajectory
 
-TELLING = 0.1
-"""Least way of the ZMP from foot to foot, as a share of their distance, that tells how the load moves."""
+LEAST_WAY = 0.1
+"""Least way of the ZMP from foot to foot, as a share of their distance, that says how the load moves."""
 
 
-def load_shares(trajectory: Trajectory) -> Array:
-    """Share of the weight that either foot bears, (T, 2), continuous in time; rows add up to 1.
+def load_distribution(trajectory: Trajectory) -> Array:
+    """Share of the weight on either foot, (T, 2), continuous in time; rows add up to 1.
 
-    A foot that bears alone bears all. Between, the share goes with the planned ZMP's way from one sole to the
-    other, stretched so that it starts and ends where the neighbouring single supports are; where the ZMP does
-    not tell (the same foot before and after), evenly in time.
+    In single support the foot in contact has all. In double support the share follows the planned ZMP's way
+    from one sole to the other, stretched so that it starts and ends where the neighbouring single supports
+    are; where the ZMP hardly moves (the same foot before and after), evenly in time.
+
+    Args:
+        trajectory: T samples, with two feet.
 
     Raises:
-        InputError: other than two feet, or a sample in which none bears.
+        InputError: other than two feet, or a sample in which none is in contact.
     """
     if len(trajectory.feet) != 2:
-        raise InputError(f"the trajectory has {len(trajectory.feet)} feet; loads are shared between two")
+        raise InputError(
+            f"the trajectory has {len(trajectory.feet)} feet; the load is distributed between two"
+        )
     flying = np.flatnonzero(~trajectory.contact.any(axis=1))
     if len(flying):
-        raise InputError(f"t = {trajectory.time[flying[0]]:.3f} s: no foot bears, and none carries a load")
+        raise InputError(
+            f"t = {trajectory.time[flying[0]]:.3f} s: no foot is in contact, so that none carries the load"
+        )
     first = np.where(trajectory.contact[:, 0], 1.0, 0.0)
     both = np.asarray(trajectory.contact.all(axis=1))
     raw = _towards_first(trajectory)
@@ -35,7 +42,7 @@ def load_shares(trajectory: Trajectory) -> Array:
         before = first[start - 1] if start > 0 else raw[start]
         after = first[end] if end < len(first) else raw[end - 1]
         way, span = raw[start:end] - raw[start], raw[end - 1] - raw[start]
-        along = way / span if abs(span) > TELLING else np.linspace(0.0, 1.0, end - start)
+        along = way / span if abs(span) > LEAST_WAY else np.linspace(0.0, 1.0, end - start)
         first[start:end] = np.clip(before + (after - before) * along, 0.0, 1.0)
     return np.stack([first, 1.0 - first], axis=1)
 

@@ -23,8 +23,8 @@ from screwkin.dynamics.support import sole_corners
 from screwkin.errors import InputError
 from screwkin.gait.plan import Plan
 from screwkin.gait.stance import LEFT, RIGHT, Foot, Hand, Stance
-from screwkin.ik.loops import PoseSolution
-from screwkin.ik.whole_body import solve_samples
+from screwkin.ik.pose import solve_pose
+from screwkin.ik.pose_solution import PoseSolution
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.mechanism.least_values import least_values
 from screwkin.mechanism.mechanism import Mechanism
@@ -98,7 +98,7 @@ def positions(robot: Robot, mechanism: Mechanism, made: Plan, guess: Array | Non
     """
     start = np.array(robot.posture("home").q) if guess is None else guess
     targets = {"base": made.T_world_base, **_targets(robot, mechanism, made)}
-    solution = solve_samples(robot, targets, State(made.T_world_base, start))
+    solution = solve_pose(robot, targets, State(made.T_world_base, start))
     solution.raise_on_failure(robot, made.time)
     return solution
 

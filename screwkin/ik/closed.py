@@ -1,26 +1,29 @@
-"""Closed forms of six-joint limbs, found from the geometry of their screw tables.
+"""Closed forms of limbs, recognised from the geometry of their screw tables, and certified over arrays.
 
-Two families are known, each also walked from the tip to the base: axes 1, 2, 3 meet in a point and 5, 6 in
-another (a spherical hip), or axes 3, 4, 5 are parallel (an offset hip). Directions may be any.
+A family is one file with a function ``recognise``, and one row of ``FAMILIES``. Those for poses are also
+walked from the tip to the base. Directions of the axes may be any.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.newton import newton
-from screwkin.algebra.scalar import Scalar
-from screwkin.algebra.se3 import Pose, Vector, pose_from_array
+from screwkin.algebra.se3 import Pose, Vector
 from screwkin.errors import InputError
-from screwkin.ik.parallel_axes import parallel_axes_branches, parallel_axes_points
-from screwkin.ik.spherical_hip import spherical_hip_branches
-from screwkin.kinematics.axis_geometry import meeting, parallel_axes_faults, spherical_hip_faults
-from screwkin.kinematics.serial_chain import Chain, distance, missing
+from screwkin.ik import parallel_axes, point_limb, spherical_hip
+from screwkin.ik.family import Branch, Family, Formulas
+from screwkin.kinematics.serial_chain import SerialChain, cached, distance, residual, target_of
 
+FAMILIES = (
+    Family("spherical hip", ("No spherical hip", "no spherical wrist"), spherical_hip.recognise),
+    Family("parallel axes", ("axes 3 to 5 do not serve", "nor axes 2 to 4"), parallel_axes.recognise),
+    Family("shoulder", ("No shoulder",), point_limb.recognise, joints=3, position=True),
+)
+"""All closed forms; the first that fits a limb is taken."""
 EXACT = 1e-12
 """Largest error [m and rad, norm] of a branch that counts as a solution."""
 SAME = 1e-6
@@ -31,105 +34,108 @@ BLOCK = 4096
 
 @dataclass(frozen=True, eq=False)
 class ClosedForm:
-    """How a limb is solved: its family, whether it is walked from the tip, and the points where axes meet."""
+    """How a limb is solved: its family, and whether it is walked from the tip."""
 
-    chain: Chain
-    family: Literal["spherical hip", "parallel axes"]
+    chain: SerialChain
+    family: str
     backwards: bool
-    hip: Vector | None = None
-    ankle: Vector | None = None
+    position: bool
+    formulas: Formulas
 
     def branches(self, target: Array) -> Array:
-        """All eight candidate branches (B, 8, 6) for tip poses (B, 4, 4), angles in (-pi, pi].
+        """All candidate branches (B, k, n) for tip poses (B, 4, 4) or positions (B, 3), angles in (-pi, pi].
 
         Those that are no solutions bring the limb near its target.
         """
-        blocks = [self._block(target[i : i + BLOCK]) for i in range(0, len(target), BLOCK)]
-        return np.concatenate(blocks) if blocks else np.zeros((0, 8, 6))
+        return np.concatenate([self._block(target[block]) for block in _blocks(len(target))])
 
-    def formula(self, target: Pose) -> list[tuple[Scalar, ...]]:
-        """All eight branches of a pose on any scalar: six angles in the limb's order, and the branch's slack.
-
-        The slack is negative where the branch is no solution, and near 0 where rounding leaves few digits.
-        """
-        chain, D = self._walked(target)
-        if self.family == "spherical hip":
-            sets = self._spherical(chain, D)
-        else:
-            sets = parallel_axes_points(chain.screws, D, chain.length)
+    def formula(self, target: Pose | Vector) -> list[Branch]:
+        """All branches of a pose or position on any scalar: positions in the limb's order, and the slack."""
         order = slice(None, None, -1) if self.backwards else slice(None)
-        return [(*branch[:6][order], branch[6]) for branch in sets]
+        return [(*branch[:-1][order], branch[-1]) for branch in self.formulas.formula(self._given(target))]
 
-    def _walked(self, target: Pose) -> tuple[Chain, Pose]:
-        """The chain as its family walks it, and how far it displaces its tip link."""
+    def _given(self, target: Pose | Vector) -> Pose | Vector:
+        """What the family's formulas take: how far the tip link is displaced as it walks the chain."""
+        if isinstance(target, Vector):
+            return target
         D = target @ self.chain.tip.inverse
-        return (self.chain.reversed, D.inverse) if self.backwards else (self.chain, D)
-
-    def _spherical(self, chain: Chain, D: Pose) -> list[tuple[Scalar, ...]]:
-        assert self.hip is not None
-        assert self.ankle is not None
-        return spherical_hip_branches(chain.screws, self.hip, self.ankle, D)
+        return D.inverse if self.backwards else D
 
     def _block(self, target: Array) -> Array:
-        chain, D = self._walked(pose_from_array(np.asarray(target)))
-        if self.family == "spherical hip":
-            sets = self._spherical(chain, D)
-            q = np.stack([np.stack(np.broadcast_arrays(*angles)) for *angles, _ in sets])
+        wanted = self._given(target_of(np.asarray(target)))
+        if self.formulas.arrays:
+            q = self.formulas.arrays(wanted)
         else:
-            q = parallel_axes_branches(chain.screws, D, chain.length)
+            batch = np.zeros(len(target))
+            sets = self.formulas.formula(wanted)
+            q = np.stack([np.stack(np.broadcast_arrays(*angles, batch)[:-1]) for *angles, _ in sets])
         q = np.moveaxis(q, -1, 0)
         return self.chain.wrapped(q[..., ::-1] if self.backwards else q)
 
 
-def closed_form(chain: Chain) -> ClosedForm:
+def closed_form(chain: SerialChain, position: bool = False, family: str | None = None) -> ClosedForm:
     """The closed form of a limb.
 
+    Args:
+        chain: of the limb.
+        position: for positions of the tip, its orientation being free.
+        family: only this one.
+
     Raises:
-        InputError: its geometry has none; the message tells what each family lacks.
+        InputError: its geometry has none; the message says what each family lacks.
     """
-    if len(chain.screws) != 6 or not chain.turning.all():
-        kinds = f"{len(chain.screws)} joints" + ("" if chain.turning.all() else ", not all revolute")
-        raise InputError(
-            f"{chain.limb} has no closed form: it has {kinds}; six revolute joints are needed. "
-            "Use a numeric method"
-        )
-    ways = [(False, chain), (True, chain.reversed)]
+    rows = [row for row in FAMILIES if row.position == position and family in (None, row.name)]
+    n = len(chain.screws)
+    fitting = [row for row in rows if row.joints == n and chain.turning.all()]
+    what = f"{chain.limb} has no closed form" + (" for positions" if position else "")
+    if not fitting:
+        kinds = f"{n} joints" + ("" if chain.turning.all() else ", not all revolute")
+        needed = " or ".join(_COUNTS.get(j, str(j)) for j in sorted({row.joints for row in rows}))
+        raise InputError(f"{what}: it has {kinds}; {needed} revolute joints are needed. Use a numeric method")
     lacks = []
-    for backwards, walked in ways:
-        lacks.append(spherical_hip_faults(walked))
-        if not lacks[-1]:
-            points = meeting(walked, (0, 1, 2)), meeting(walked, (4, 5))
-            return ClosedForm(chain, "spherical hip", backwards, *points)
-    for backwards, walked in ways:
-        lacks.append(parallel_axes_faults(walked))
-        if not lacks[-1]:
-            return ClosedForm(chain, "parallel axes", backwards)
-    told = ["; ".join(faults) for faults in lacks]
-    raise InputError(
-        f"{chain.limb} has no closed form. No spherical hip: {told[0]}; no spherical wrist: {told[1]}. "
-        f"Its axes 3 to 5 do not serve: {told[2]}; nor its axes 2 to 4: {told[3]}. Use a numeric method"
-    )
+    for row in fitting:
+        for backwards, label in enumerate(row.lacks):
+            formulas = row.recognise(chain.reversed if backwards else chain)
+            if isinstance(formulas, Formulas):
+                return ClosedForm(chain, row.name, bool(backwards), position, formulas)
+            lacks.append(f"{label}: {'; '.join(formulas)}")
+    raise InputError(f"{what}. {'. '.join(lacks)}. Use a numeric method")
+
+
+_COUNTS = {3: "three", 6: "six"}
+
+
+@cached
+def recognised(chain: SerialChain, position: bool = False) -> ClosedForm | None:
+    """The closed form of a limb, None where it has none."""
+    try:
+        return closed_form(chain, position)
+    except InputError:
+        return None
+
+
+def _blocks(count: int) -> list[slice]:
+    return [slice(i, i + BLOCK) for i in range(0, max(count, 1), BLOCK)]
 
 
 def solve_closed(
     form: ClosedForm, target: Array, guess: Array | None = None, least_squares: bool = True
 ) -> tuple[Array, Array, Array]:
-    """All solutions of a limb for tip poses (B, 4, 4).
+    """All solutions of a limb, certified by their residual.
 
     Args:
         form: of the limb.
-        target: tip poses.
-        guess: (B, 6), default zero; it decides between least-squares answers that are equally good.
+        target: tip poses (B, 4, 4), or positions (B, 3).
+        guess: (B, n), default zero; it decides between least-squares answers that are equally good.
         least_squares: seek these where there is no solution.
 
     Returns:
-        q (B, 8, 6) with angles in (-pi, pi]; error (B, 8) [m and rad, norm]; valid (B, 8) bool. A double
+        q (B, k, n) with angles in (-pi, pi]; error (B, k) [m and rad, norm]; valid (B, k) bool. A double
         root is valid once. Where no branch is valid, the first is the least-squares answer, if wanted, else
         the closed form's branch of least error.
     """
-    guess = np.zeros((len(target), 6)) if guess is None else guess
-    blocks = [slice(i, i + BLOCK) for i in range(0, max(len(target), 1), BLOCK)]
-    parts = [_solved_block(form, target[block], guess[block], least_squares) for block in blocks]
+    guess = np.zeros((len(target), len(form.chain.names))) if guess is None else guess
+    parts = [_solved_block(form, target[b], guess[b], least_squares) for b in _blocks(len(target))]
     q, error, valid = (np.concatenate(part) for part in zip(*parts, strict=True))
     return q, error, valid
 
@@ -142,40 +148,40 @@ def _solved_block(
     valid = _first_of_its_kind(q, error) & (error <= EXACT)
     lost = np.flatnonzero(~valid.any(axis=1))
     if len(lost):
-        best = _likeliest(form.chain, q[lost], error[lost], guess[lost])
+        best = likeliest(form.chain, q[lost], error[lost], guess[lost])
         if least_squares:
             best = form.chain.wrapped(nearest(form.chain, best, target[lost]))
         q[lost, 0] = best
         error[lost, 0] = distance(form.chain, q[lost, 0], target[lost])
-        # A limb that can move with its tip held has a whole family of solutions: one of them is found here.
+        # A limb that can move with its tip held has a whole family of solutions: here is one of them.
         valid[lost, 0] = error[lost, 0] <= EXACT
     return q, error, valid
 
 
-def _likeliest(chain: Chain, q: Array, error: Array, guess: Array) -> Array:
+def likeliest(chain: SerialChain, q: Array, error: Array, guess: Array) -> Array:
     """Of the branches (B, k, n) about as near as the nearest: least beyond limits, then next to the guess."""
     far = error > 1.01 * error.min(axis=1, keepdims=True) + EXACT
     apart = np.linalg.norm(np.sin((q - guess[:, None]) / 2), axis=-1)
-    best = np.lexsort((apart, chain.beyond(q), far), axis=1)[:, 0]
+    best = np.lexsort((apart, np.maximum(chain.excess(q), 0.0), far), axis=1)[:, 0]
     return np.asarray(np.take_along_axis(q, best[:, None, None], axis=1)[:, 0])
 
 
-def nearest(chain: Chain, q: Array, target: Array) -> Array:
+def nearest(chain: SerialChain, q: Array, target: Array) -> Array:
     """Joint positions (B, n) that bring the tip nearest to its target in the sense of least squares.
 
     The squares are those of the rotation angle and of the distance over the limb's length.
     """
-    scale = np.r_[np.ones(target.shape[-1] - 1), np.full(3, 1 / chain.length)][-6:]
+    scale = np.r_[np.ones(3), np.full(3, 1 / chain.length)]
 
-    def residual(x: Array, samples: Array) -> tuple[Array, Array]:
-        lack, J = missing(chain, x, target[samples])
-        weights = scale[-lack.shape[1] :]
-        return lack * weights, J * weights[:, None]
+    def lack(x: Array, samples: Array) -> tuple[Array, Array]:
+        r, J = residual(chain, x, target[samples])
+        weights = scale[-r.shape[1] :]
+        return r * weights, J * weights[:, None]
 
-    return newton(residual, q, tolerance=1e-15).x
+    return newton(lack, q, tolerance=1e-15).x
 
 
-def _refined(chain: Chain, q: Array, target: Array, steps: int = 2) -> tuple[Array, Array]:
+def _refined(chain: SerialChain, q: Array, target: Array, steps: int = 2) -> tuple[Array, Array]:
     """Branches (B, k, n) after Newton steps where rounding has left too much; and their errors (B, k).
 
     Near a singular position a closed form loses digits, as an arc cosine near 1 does; two steps on the whole
@@ -188,7 +194,7 @@ def _refined(chain: Chain, q: Array, target: Array, steps: int = 2) -> tuple[Arr
         at = np.flatnonzero((error > 1e-14) & (error < 1e-4))
         if not len(at):
             break
-        lack, J = missing(chain, flat[at], wanted[at])
+        lack, J = residual(chain, flat[at], wanted[at])
         new = flat[at] + (np.linalg.pinv(J, rcond=1e-9) @ lack[..., None])[..., 0]
         new_error = distance(chain, new, wanted[at])
         better = new_error < error[at]

@@ -15,10 +15,10 @@ from screwkin.algebra.se3 import dot
 from screwkin.errors import InputError
 from screwkin.ik.closed import ClosedForm, closed_form
 from screwkin.kinematics.axis_geometry import meeting, parallel
-from screwkin.kinematics.serial_chain import Chain
+from screwkin.kinematics.serial_chain import SerialChain
 
 
-def spherical_variant(chain: Chain) -> Chain:
+def spherical_variant(chain: SerialChain) -> SerialChain:
     """The chain with its first two axes moved, unturned, to where the third comes nearest to the ankle.
 
     Raises:
@@ -40,7 +40,7 @@ def spherical_variant(chain: Chain) -> Chain:
     return replace(chain, screws=(*moved, *chain.screws[3:]))
 
 
-def hybrid_seed(chain: Chain, target: Array, guess: Array) -> Array:
+def hybrid_seed(chain: SerialChain, target: Array, guess: Array) -> Array:
     """Joint positions (B, n) that bring the tip near its target poses (B, 4, 4), by the spherical variant.
 
     Of its eight branches the one least beyond the joint limits, among equals the nearest to the guess (B, n).
@@ -48,5 +48,5 @@ def hybrid_seed(chain: Chain, target: Array, guess: Array) -> Array:
     form: ClosedForm = closed_form(spherical_variant(chain))
     q = form.branches(target)
     apart = np.linalg.norm(np.sin((q - guess[:, None]) / 2), axis=-1)
-    best = np.lexsort((apart, chain.beyond(q)), axis=1)[:, 0]
+    best = np.lexsort((apart, np.maximum(chain.excess(q), 0.0)), axis=1)[:, 0]
     return np.asarray(np.take_along_axis(q, best[:, None, None], axis=1)[:, 0])

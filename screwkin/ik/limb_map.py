@@ -1,7 +1,8 @@
-"""Kernel of workspace maps: what a limb does to put its tip at a point with the orientation of the zero pose.
+"""Program of workspace maps: how a limb puts its tip at a point with the orientation of the zero pose.
 
 The tip's orientation is a constant, so it folds away; of all branches of the closed form one is chosen, and
-only of that one the conditioning is computed. What rounding leaves open is marked.
+only of that one the conditioning is computed. What rounding could decide is not certified; ``ik.reach``
+then falls back on other solvers.
 """
 
 from __future__ import annotations
@@ -19,18 +20,19 @@ from screwkin.compiler.program import Program, Recorder, kept
 from screwkin.compiler.records import identifier
 from screwkin.ik.closed import closed_form
 from screwkin.ik.programs import cosines, wrapped
-from screwkin.kinematics.serial_chain import Chain
+from screwkin.kinematics.limits import beyond
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.limb_motion import seen_from
 from screwkin.model.robot import Robot
 
 CLEAR = 1e-7
-"""Slack of a branch from which its sign alone tells whether it is a solution."""
+"""Slack of a branch from which its sign alone decides whether it is a solution."""
 NEAR = 1e-7
-"""Angles [rad] closer to a limit, or to each other where the larger decides, are left in doubt."""
+"""Angles [rad] closer to a limit, or to each other where the larger decides, are not certified."""
 ALIKE = 1e-9
 """Difference of the sums of (1 - cos) below which two branches are equally near to the guess."""
 WELL = 1e-3
-"""Inverse condition number below which the sample is left to algorithms that polish their solutions."""
+"""Inverse condition number below which a sample is not certified: its solution needs polishing."""
 ERROR = 1e-10
 """Error of a solution [m and rad, norm], over the inverse condition number, that counts as rounding."""
 INSIDE, OUTSIDE = 50.0, -50.0
@@ -38,7 +40,7 @@ INSIDE, OUTSIDE = 50.0, -50.0
 FAR = 40.0
 """An angle beyond all others [rad]; a joint without limits lies so far inside."""
 LIMITS = 2.0
-"""Cause from which limits are told, two for every joint."""
+"""First cause that is a limit, two for every joint."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ class _Branch:
         key: the larger, the better: inside the limits above 50, the nearest to the guess best; then the
             least beyond the limits; below -50 where it is no solution.
         cause: 0 inside the limits, 1 no solution, then lower and upper limit of every joint.
-        clear: condition: rounding leaves open neither whether it is a solution nor if it is inside.
+        clear: condition: rounding decides neither whether it is a solution nor if it is inside.
     """
 
     q: Sequence[Scalar]
@@ -61,7 +63,7 @@ class _Branch:
 
 @kept
 def limb_map(robot: Robot, limb: str, guess: tuple[float, ...], length: float) -> Program:
-    """What decides whether a limb reaches a point, and how well it is conditioned there.
+    """Program: what decides whether a limb reaches a point, and how well it is conditioned there.
 
     Args:
         robot: the robot.
@@ -69,12 +71,12 @@ def limb_map(robot: Robot, limb: str, guess: tuple[float, ...], length: float) -
         guess: joint positions; of the solutions inside the limits the nearest is taken.
         length: by which velocities are divided in the condition number [m].
     """
-    chain = Chain.of(robot, limb)
+    chain = SerialChain.of(robot, limb)
     recorder = Recorder(
         identifier(robot.name, chain.limb, "map"),
         f"Where {chain.limb} of {robot.name} puts its tip at a point of the base frame, oriented as in the"
         " zero pose. cause: 0 reached, 1 out of reach, then lower and upper limit of every joint; inverse:"
-        " inverse condition number of the tip's Jacobian; sure: 1 if rounding leaves nothing open about"
+        " inverse condition number of the tip's Jacobian; certified: 1 if rounding decides nothing about"
         " cause and joint positions, and about the condition number.",
     )
     point, level = Vector(*recorder.input("point", 3)), replace(chain, tip=Pose(UNTURNED, chain.tip.p))
@@ -88,42 +90,41 @@ def limb_map(robot: Robot, limb: str, guess: tuple[float, ...], length: float) -
     recorder.output("cause", [best.cause])
     recorder.output("q", best.q)
     recorder.output("inverse", [inverse])
-    sure = clear & _decided(level, best) & (exact | (best.key < OUTSIDE))
-    recorder.output("sure", [where(sure, 1.0, 0.0), where(values.error <= TRUSTED, 1.0, 0.0)])
+    certified = clear & _decided(level, best) & (exact | (best.key < OUTSIDE))
+    flags = certified, values.error <= TRUSTED
+    recorder.output("certified", [where(flag, 1.0, 0.0) for flag in flags])
     return recorder.program()
 
 
-def _judged(chain: Chain, branch: Sequence[Scalar], near: Sequence[tuple[Scalar, Scalar]]) -> _Branch:
+def _judged(chain: SerialChain, branch: Sequence[Scalar], near: Sequence[tuple[Scalar, Scalar]]) -> _Branch:
     """A branch (angles, slack) against the limits and the sines and cosines of the guess."""
     *angles, slack = branch
     q = wrapped(chain, angles)
-    beyond: Scalar = -FAR
+    excess: Scalar = -FAR
     limit: Scalar = LIMITS
     for joint, x in enumerate(q):
         here, upper = _beyond(chain, joint, x)
-        worse = here > beyond
-        beyond = where(worse, here, beyond)
+        worse = here > excess
+        excess = where(worse, here, excess)
         limit = where(worse, where(upper, LIMITS + 2 * joint + 1, LIMITS + 2 * joint), limit)
     alike = sum(cosines(q, near))
-    valid, inside = slack > 0, beyond <= 0
-    key = where(valid, where(inside, 2 * INSIDE + alike, -beyond), 2 * OUTSIDE)
+    valid, inside = slack > 0, excess <= 0
+    key = where(valid, where(inside, 2 * INSIDE + alike, -excess), 2 * OUTSIDE)
     cause = where(valid, where(inside, 0.0, limit), 1.0)
-    return _Branch(q, key, cause, (abs_(slack) > CLEAR) & (~valid | (abs_(beyond) > NEAR)))
+    return _Branch(q, key, cause, (abs_(slack) > CLEAR) & (~valid | (abs_(excess) > NEAR)))
 
 
-def _beyond(chain: Chain, joint: int, x: Scalar) -> tuple[Scalar, Scalar]:
+def _beyond(chain: SerialChain, joint: int, x: Scalar) -> tuple[Scalar, Scalar]:
     """How far an angle lies beyond the limits of its joint, negative inside; and if beyond the upper one."""
     low, high = float(chain.lower[joint]), float(chain.upper[joint])
-    if math.isinf(low):
-        return (x - high, True) if math.isfinite(high) else (-FAR, False)
-    if math.isinf(high):
-        return low - x, False
-    middle = (low + high) / 2
-    return abs_(x - middle) - (high - low) / 2, x > middle
+    if math.isinf(low) or math.isinf(high):
+        unlimited = math.isinf(low) and math.isinf(high)
+        return (-FAR, False) if unlimited else (beyond(x, low, high), math.isinf(low))
+    return beyond(x, low, high), x > (low + high) / 2
 
 
 def _chosen(branches: Sequence[_Branch]) -> tuple[_Branch, Scalar]:
-    """The best branch, and a condition: no other one is as good to rounding and tells something else."""
+    """The best branch, and a condition: no other one is as good to rounding and has another cause."""
     best, clear, second = branches[0], branches[0].clear, 4.0 * OUTSIDE
     for branch in branches[1:]:
         better = branch.key > best.key
@@ -138,7 +139,7 @@ def _chosen(branches: Sequence[_Branch]) -> tuple[_Branch, Scalar]:
     return best, clear
 
 
-def _decided(chain: Chain, best: _Branch) -> Scalar:
+def _decided(chain: SerialChain, best: _Branch) -> Scalar:
     """Condition: if limits cut the best branch off, one of them is clearly the worst."""
     first: Scalar = -FAR
     second: Scalar = -FAR
@@ -150,9 +151,9 @@ def _decided(chain: Chain, best: _Branch) -> Scalar:
 
 
 def _conditioning(
-    chain: Chain, q: Sequence[Scalar], target: Pose, length: float, link: int
+    chain: SerialChain, q: Sequence[Scalar], target: Pose, length: float, link: int
 ) -> tuple[Extremes, Scalar]:
-    """Singular values of the tip's Jacobian in the axes of a link, and how far the tip is from its target."""
+    """Singular values of the tip's Jacobian in the axes of a link, and the residual of the tip's pose."""
     seen = seen_from(chain.screws, q, link)
     tip, wanted = seen[-1] @ chain.tip.p, seen[0] @ target.p
     columns = []
@@ -166,7 +167,7 @@ def _conditioning(
     return extreme_singular_values(columns), scalar.sqrt(turn * 0.5 + dot(tip - wanted, tip - wanted))
 
 
-def _best_link(chain: Chain, length: float) -> int:
+def _best_link(chain: SerialChain, length: float) -> int:
     """After how many joints the link stands in whose axes the singular values take least operations."""
 
     def cost(link: int) -> int:

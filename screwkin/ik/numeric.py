@@ -1,32 +1,35 @@
-"""Inverse kinematics of a limb: closed form, hybrid and numeric methods, batched over samples.
+"""Numeric methods: iterations from a guess, for limbs and for limbs that share joints, batched over samples.
 
-Numeric methods iterate all samples at once; those that have arrived rest. ``pinv`` and ``dls`` are the plain
-iterations of paper B on the unscaled Jacobian (rows in rad and m); ``lm`` and ``newton`` divide lengths by
-the limb's size.
+All samples are iterated at once; those that have arrived rest. ``pinv`` and ``dls`` are the plain iterations
+of paper B on the unscaled Jacobian (rows in rad and m); ``lm`` and ``newton`` divide lengths by the limb's
+size. What has not arrived inside the limits is begun anew from a fixed set of other starts.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Literal, get_args
 
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.algebra.newton import newton
+from screwkin.algebra.newton import newton, solved
 from screwkin.errors import InputError
-from screwkin.ik.closed import closed_form, solve_closed
-from screwkin.ik.hybrid import hybrid_seed
-from screwkin.ik.solutions import LimbSolutions, ordered
-from screwkin.kinematics.serial_chain import Chain, missing
+from screwkin.ik.system import System
 
 Numeric = Literal["newton", "lm", "dls", "pinv"]
-Method = Literal["auto", "closed", "hybrid", "newton", "lm", "dls", "pinv"]
-
 
 CUT = 1e-15
 """Singular values below this share of the largest are dropped by the pseudoinverse: hardly any is."""
+BEND = 0.3
+"""How far the second start is from the guess [rad]: it leaves the saddle of a straight limb."""
+HOPELESS = 8
+"""Starts after which a sample that has arrived from none of them is given up."""
+LATER = 100
+"""Bound on the steps from every start but the first: most that arrive do so in 20."""
+BETTER = 0.99
+"""Share of the residual below which the end of a later start replaces that of an earlier one."""
 
 
 @dataclass(frozen=True)
@@ -36,10 +39,12 @@ class IkSettings:
     Attributes:
         position_tolerance: distance at which a sample has arrived [m].
         rotation_tolerance: angle at which it has arrived [rad].
-        max_iterations: bound on the steps.
+        max_iterations: bound on the steps from every start.
         damping: lambda of ``dls``; its square is added to J J^T (rows in rad and m).
         gain: share of the step that ``pinv`` and ``dls`` take.
         finish: the numeric method that ``hybrid`` continues with.
+        starts: number of starts, the guess first, for samples that do not arrive inside the limits; the
+            others are fixed: next to the guess, then evenly spread within the limits.
     """
 
     position_tolerance: float = 1e-10
@@ -48,6 +53,7 @@ class IkSettings:
     damping: float = 0.01
     gain: float = 1.0
     finish: Numeric = "newton"
+    starts: int = 20
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -58,126 +64,165 @@ class IkSettings:
             elif not (isinstance(value, int | float) and np.isfinite(value) and value > 0):
                 raise InputError(f"{field.name} is {value!r}; it must be a positive number")
 
+    @property
+    def tolerances(self) -> tuple[float, float]:
+        """Of angle [rad] and distance [m]."""
+        return self.rotation_tolerance, self.position_tolerance
 
-def solve_limb(
-    chain: Chain,
-    target: Array,
-    method: Method,
-    guess: Array,
-    settings: IkSettings,
-    batch: tuple[int, ...],
-    nearest: bool = True,
-) -> LimbSolutions:
-    """Joint positions that put the tip of a limb at its targets.
+
+@dataclass(frozen=True, eq=False)
+class _Ends:
+    """Where iterations of B samples have ended: x (B, n), steps (B,), size of the residual (B,), rank (B,).
+
+    The rank is 0 for a solution inside the limits, 1 for another one, 2 for none.
+    """
+
+    x: Array
+    iterations: Array
+    size: Array
+    rank: Array
+
+
+def solve_system(system: System, method: Numeric, guess: Array, settings: IkSettings) -> tuple[Array, Array]:
+    """Joint positions that bring all tips of a system to their targets.
+
+    Of all starts the first solution inside the limits is taken, else the solution nearest to the guess, else
+    the end of least residual.
 
     Args:
-        chain: n joints.
-        target: poses (B, 4, 4), or positions (B, 3), in the base frame.
-        method: ``"auto"`` is closed where the geometry has a closed form and the target is a pose.
-        guess: (B, n); numeric methods start there.
-        settings: of the numeric methods.
-        batch: shape with B samples, for the result.
-        nearest: let the closed form end with the least-squares answer where there is no solution.
+        system: n joints.
+        method: how to iterate.
+        guess: (B, n), the first start.
+        settings: tolerances and the like.
 
-    Raises:
-        InputError: the method does not fit the limb or the target.
+    Returns:
+        x (B, n), and the steps (B,) from the start that led there.
     """
-    if method == "auto":
-        method = "newton" if target.ndim == 2 or not _has_closed_form(chain) else "closed"
-    if target.ndim == 2 and method in ("closed", "hybrid"):
-        raise InputError(f"method {method} needs poses (..., 4, 4); positions (..., 3) need a numeric method")
-    if method == "closed":
-        q, error, valid = solve_closed(closed_form(chain), target, guess, nearest)
-        return ordered(chain, method, q, valid, error, np.ones(error.shape, dtype=int), guess, batch)
-    start = hybrid_seed(chain, target, guess) if method == "hybrid" else guess
-    solver = settings.finish if method == "hybrid" else method
-    q, iterations = _NUMERIC[solver](chain, target, start, settings)
-    q = chain.wrapped(q)
-    lack, _ = missing(chain, q, target)
-    error = np.linalg.norm(lack, axis=1)
-    one = (slice(None), None)
-    return ordered(
-        chain, method, q[one], arrived(lack, settings)[one], error[one], iterations[one], guess, batch
-    )
+    best = _ended(system, method, guess, settings)
+    later = replace(settings, max_iterations=min(settings.max_iterations, LATER))
+    for k in range(1, settings.starts):
+        at = np.flatnonzero(best.rank == 1 if k >= HOPELESS else best.rank > 0)
+        if not len(at):
+            break
+        end = _ended(system.part(at), method, start(system, guess[at], k), later)
+        better = end.rank < best.rank[at]
+        nearer = _far(system, end.x, guess[at]) < _far(system, best.x[at], guess[at])
+        better |= (end.rank == 1) & (best.rank[at] == 1) & nearer
+        better |= (end.rank == 2) & (best.rank[at] == 2) & (end.size < BETTER * best.size[at])
+        for field in fields(_Ends):
+            getattr(best, field.name)[at[better]] = getattr(end, field.name)[better]
+    return best.x, best.iterations
 
 
-def _has_closed_form(chain: Chain) -> bool:
-    try:
-        closed_form(chain)
-    except InputError:
-        return False
-    return True
+def _far(system: System, x: Array, guess: Array) -> Array:
+    """Squared distance (B,) from the guess, whole turns apart."""
+    apart = np.where(system.turning, 2 * np.sin((x - guess) / 2), x - guess)
+    return np.asarray((apart**2).sum(axis=1))
 
 
-def arrived(lack: Array, settings: IkSettings) -> Array:
-    """(B,) bool: what lacks (B, 6 or 3) is within both tolerances."""
-    near = np.linalg.norm(lack[:, -3:], axis=1) <= settings.position_tolerance
-    return near & (np.linalg.norm(lack[:, :-3], axis=1) <= settings.rotation_tolerance)
+def start(system: System, guess: Array, k: int) -> Array:
+    """The start (B, n) number k: near the guess for k = 1, then spread evenly within the limits.
+
+    Source: the additive recurrence of Roberts (2018), a generalised golden ratio.
+    """
+    n = guess.shape[1]
+    ratio = 2.0
+    for _ in range(60):
+        ratio = (1 + ratio) ** (1 / (n + 1))
+    share = (0.5 + k * ratio ** -np.arange(1.0, n + 1)) % 1.0
+    reach = np.where(system.turning, np.pi, system.length)
+    low = np.where(np.isfinite(system.lower), system.lower, np.minimum(-reach, system.upper - 2 * reach))
+    high = np.where(np.isfinite(system.upper), system.upper, np.maximum(reach, low + 2 * reach))
+    if k > 1:
+        return np.broadcast_to(low + share * (high - low), guess.shape).copy()
+    bend = BEND * np.where(system.turning, 1.0, system.length) * (0.5 + share)
+    inward = np.where(guess + bend <= high, bend, -bend)
+    return guess + inward
+
+
+def arrived(system: System, lack: Array, settings: IkSettings) -> Array:
+    """(B,) bool: a residual (B, m) is within both tolerances, for every limb."""
+    good = np.ones(len(lack), dtype=bool)
+    for rows in system.slices:
+        own = lack[:, rows]
+        good &= np.linalg.norm(own[:, -3:], axis=1) <= settings.position_tolerance
+        good &= np.linalg.norm(own[:, :-3], axis=1) <= settings.rotation_tolerance
+    return good
+
+
+def _ended(system: System, method: Numeric, start: Array, settings: IkSettings) -> _Ends:
+    """Iterations from one start, their end put inside the limits where the tolerances allow it."""
+    x, iterations = _METHODS[method](system, start, settings)
+    x = system.wrapped(x)
+    everyone = np.arange(len(x))
+    lack, _ = system.residual(x, everyone)
+    good = arrived(system, lack, settings)
+    at = np.flatnonzero(good & ~system.within(x))
+    if len(at):
+        held = np.clip(x[at], system.lower, system.upper)
+        rest, _ = system.residual(held, at)
+        still = arrived(system, rest, settings)
+        x[at[still]], lack[at[still]] = held[still], rest[still]
+    rank = np.where(good, np.where(system.within(x), 0, 1), 2)
+    return _Ends(x, iterations, np.linalg.norm(lack * system.weights, axis=1), rank)
 
 
 def _iterated(
-    chain: Chain, target: Array, q: Array, settings: IkSettings, step: Callable[[Array, Array], Array]
+    system: System, x: Array, settings: IkSettings, step: Callable[[Array, Array], Array]
 ) -> tuple[Array, Array]:
-    """Repeat q += step(J, lack) for every sample until it has arrived; and how often."""
-    q, iterations = q.copy(), np.zeros(len(q), dtype=int)
-    at = np.arange(len(q))
+    """Repeat x += step(J, lack) for every sample until it has arrived; and how often."""
+    x, iterations = x.copy(), np.zeros(len(x), dtype=int)
+    at = np.arange(len(x))
     for left in range(settings.max_iterations, -1, -1):
-        lack, J = missing(chain, q[at], target[at])
-        on = ~arrived(lack, settings)
+        lack, J = system.residual(x[at], at)
+        on = ~arrived(system, lack, settings)
         at = at[on]
         if not left or not len(at):
             break
-        q[at] = chain.wrapped(q[at] + step(J[on], lack[on]))
+        x[at] = system.wrapped(x[at] + step(J[on], lack[on]))
         iterations[at] += 1
-    return q, iterations
+    return x, iterations
 
 
-def _pinv(chain: Chain, target: Array, q: Array, settings: IkSettings) -> tuple[Array, Array]:
+def _pinv(system: System, x: Array, settings: IkSettings) -> tuple[Array, Array]:
     def step(J: Array, lack: Array) -> Array:
         return settings.gain * (np.linalg.pinv(J, rcond=CUT) @ lack[..., None])[..., 0]
 
-    return _iterated(chain, target, q, settings, step)
+    return _iterated(system, x, settings, step)
 
 
-def _dls(chain: Chain, target: Array, q: Array, settings: IkSettings) -> tuple[Array, Array]:
+def _dls(system: System, x: Array, settings: IkSettings) -> tuple[Array, Array]:
     def step(J: Array, lack: Array) -> Array:
         Jt = J.swapaxes(1, 2)
         lifted = J @ Jt + settings.damping**2 * np.eye(J.shape[1])
         return settings.gain * (Jt @ np.linalg.solve(lifted, lack[..., None]))[..., 0]
 
-    return _iterated(chain, target, q, settings, step)
+    return _iterated(system, x, settings, step)
 
 
-def _lm(chain: Chain, target: Array, q: Array, settings: IkSettings) -> tuple[Array, Array]:
+def _lm(system: System, x: Array, settings: IkSettings) -> tuple[Array, Array]:
     """Levenberg-Marquardt with a damping that follows the error (Sugihara 2011): no step is ever refused."""
 
     def step(J: Array, lack: Array) -> Array:
-        weights = _weights(chain, lack)
-        J, lack = J * weights[:, None], lack * weights
+        J, lack = J * system.weights[:, None], lack * system.weights
         Jt = J.swapaxes(1, 2)
         damping = 0.5 * (lack**2).sum(axis=1) + 1e-12
         lifted = Jt @ J + damping[:, None, None] * np.eye(J.shape[2])
-        return np.asarray(np.linalg.solve(lifted, Jt @ lack[..., None])[..., 0])
+        return np.nan_to_num(solved(lifted, (Jt @ lack[..., None])[..., 0]))
 
-    return _iterated(chain, target, q, settings, step)
+    return _iterated(system, x, settings, step)
 
 
-def _newton(chain: Chain, target: Array, q: Array, settings: IkSettings) -> tuple[Array, Array]:
+def _newton(system: System, x: Array, settings: IkSettings) -> tuple[Array, Array]:
     """The safeguarded Newton method of ``algebra.newton``."""
 
     def residual(x: Array, samples: Array) -> tuple[Array, Array]:
-        lack, J = missing(chain, x, target[samples])
-        weights = _weights(chain, lack)
-        return lack * weights, J * weights[:, None]
+        lack, J = system.residual(x, samples)
+        return lack * system.weights, J * system.weights[:, None]
 
-    tolerance = min(settings.rotation_tolerance, settings.position_tolerance / chain.length)
-    result = newton(residual, q, tolerance, settings.max_iterations)
+    tolerance = min(settings.rotation_tolerance, settings.position_tolerance / system.length)
+    result = newton(residual, x, tolerance, settings.max_iterations)
     return result.x, result.iterations
 
 
-def _weights(chain: Chain, lack: Array) -> Array:
-    """One for angles, the inverse of the limb's size for lengths."""
-    return np.r_[np.ones(lack.shape[1] - 3), np.full(3, 1 / chain.length)]
-
-
-_NUMERIC = {"pinv": _pinv, "dls": _dls, "lm": _lm, "newton": _newton}
+_METHODS = {"pinv": _pinv, "dls": _dls, "lm": _lm, "newton": _newton}

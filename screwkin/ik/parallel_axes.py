@@ -15,9 +15,12 @@ from screwkin.algebra.quartic import circle_points, circle_roots
 from screwkin.algebra.scalar import Scalar, atan2, least, where
 from screwkin.algebra.screws import Screw, displacement
 from screwkin.algebra.se3 import Pose, Vector, cross, dot, map_scalars, norm, rotate
+from screwkin.ik.family import Formulas
 from screwkin.ik.hip_equations import HipEquations, chosen, pitch_directions
 from screwkin.ik.planar_triangle import flattened, planar_branches
 from screwkin.ik.subproblems import turn_onto
+from screwkin.kinematics.axis_geometry import ALIKE, angle, apart, listed, parallel
+from screwkin.kinematics.serial_chain import SerialChain
 
 SAME = 1e-7
 """Two roots of the hip's equations closer than this [rad] are one: what rounding leaves of a double root."""
@@ -25,6 +28,40 @@ FREE = 1e-13
 """Size of the quartic, over the limb's length squared, at which it vanishes: the hip may turn freely."""
 STEPS = 3
 """Newton steps on the hip's equations: one suffices for a simple root, two for one of half the digits."""
+
+
+def recognise(chain: SerialChain) -> Formulas | list[str]:
+    """The branches of a chain whose axes 3, 4 and 5 are parallel, or what it lacks."""
+    if faults := parallel_axes_faults(chain):
+        return faults
+    return Formulas(
+        lambda D: parallel_axes_points(chain.screws, D, chain.length),
+        lambda D: parallel_axes_branches(chain.screws, D, chain.length),
+    )
+
+
+def parallel_axes_faults(chain: SerialChain) -> list[str]:
+    """What keeps the chain from having three parallel axes in the middle."""
+    faults = [
+        f"the axes of {listed(chain, pair)} are not parallel ({np.degrees(angle(chain, *pair)):.3g} deg)"
+        for pair in ((2, 3), (3, 4))
+        if not parallel(chain, *pair)
+    ]
+    if faults:
+        return faults
+    faults = [
+        f"the axes of {listed(chain, pair)} fall together"
+        for pair in ((2, 3), (3, 4))
+        if apart(chain, *pair) <= ALIKE * chain.length
+    ]
+    faults += [
+        f"the axes of {listed(chain, pair)} are parallel too"
+        for pair in ((1, 2), (4, 5))
+        if parallel(chain, *pair)
+    ]
+    if parallel(chain, 0, 1) and apart(chain, 0, 1) <= ALIKE * chain.length:
+        faults.append(f"the axes of {listed(chain, (0, 1))} fall together")
+    return faults
 
 
 def hip_solutions(screws: Sequence[Screw], D: Pose, length: float) -> tuple[Array, Array]:

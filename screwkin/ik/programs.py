@@ -1,68 +1,116 @@
-"""Kernels of limbs: closed-form inverse kinematics, of one limb or of the whole body.
+"""Programs of limbs with closed forms: all branches in order, or the one nearest to a guess.
 
-What rounding leaves in doubt is marked, so that the algorithms of ``solve`` decide there.
+One rule orders branches everywhere: those inside the limits first, then the nearest to the guess. A program
+certifies its answer only where rounding cannot change a decision; ``ik.certify`` decides the rest.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 from screwkin.algebra import scalar
-from screwkin.algebra.scalar import Scalar, abs_, where
-from screwkin.algebra.screws import AT_REST, advance
-from screwkin.algebra.se3 import NO_TWIST, UNTURNED, ZERO, Pose, Vector, dot
-from screwkin.compiler.program import Program, Recorder, kept
+from screwkin.algebra.scalar import Scalar, abs_, larger, least, where
+from screwkin.algebra.se3 import NO_TWIST, ZERO, Pose, Vector
+from screwkin.compiler.program import Program, Recorder
 from screwkin.compiler.records import identifier, pose_input
-from screwkin.errors import InputError
-from screwkin.ik.closed import EXACT, closed_form
-from screwkin.ik.point_limb import point_branches, shoulder_of
-from screwkin.kinematics.serial_chain import Chain
-from screwkin.kinematics.status import CLOSED, SINGULAR
+from screwkin.ik.closed import EXACT, recognised
+from screwkin.kinematics.limits import CUT, LIMIT_TOLERANCE, TURN, beyond, turn_within
+from screwkin.kinematics.serial_chain import SerialChain, cached, miss
+from screwkin.kinematics.status import SINGULAR
 from screwkin.mechanism.limb_motion import seen_screws
-from screwkin.mechanism.limb_rates import doubtful, point_rates, pose_rates, split_of
-from screwkin.mechanism.tip_motion import best_link
+from screwkin.mechanism.limb_rates import point_rates, pose_rates, split_of
 from screwkin.model.robot import Robot
 
-DOUBT = 1e-8
-"""Slack of a branch below which it is left to the algorithms that keep their digits there."""
-WITHIN = 1e-9
-"""Excess over a limit that counts as rounding, as in ``Chain.within``."""
-FARTHER = 100.0
-"""More than the nearness of two branches can differ."""
-FOUND = (
-    "found: 1 if there is a solution, 0 if there is none (then q is the guess), -1 if rounding leaves it open"
-)
+CLEAR = 1e-8
+"""Slack of a branch from which its sign alone says whether it is a solution."""
+TIE = 1e-9
+"""Difference of the sums of (1 - cos) above which one branch is nearer to the guess than another."""
+NEAR_LIMIT = 1e-10
+"""Excess [rad] closer than this to the tolerance of limits is not decided by a program."""
+INSIDE = 100.0
+"""What being inside the limits counts, more than the nearness of two branches can differ."""
+Pairs = list[tuple[Scalar, Scalar]]
 
 
-@kept
-def limb_branches(robot: Robot, limb: str) -> Program:
+def _clipped(chain: SerialChain, guess: Sequence[Scalar]) -> list[Scalar]:
+    """The guess, inside the limits: as such it counts."""
+    ends = zip(guess, chain.lower.tolist(), chain.upper.tolist(), strict=True)
+    held = []
+    for x, low, high in ends:
+        x = larger(x, low) if math.isfinite(low) else x
+        held.append(least(x, high) if math.isfinite(high) else x)
+    return held
+
+
+def _sines(q: Sequence[Scalar]) -> Pairs:
+    return [(scalar.sin(x), scalar.cos(x)) for x in q]
+
+
+def cosines(q: Sequence[Scalar], near: Sequence[tuple[Scalar, Scalar]]) -> list[Scalar]:
+    """Cosines of the differences of angles from others, given by sine and cosine."""
+    return [scalar.sin(x) * s + scalar.cos(x) * c for x, (s, c) in zip(q, near, strict=True)]
+
+
+def wrapped(chain: SerialChain, q: Sequence[Scalar]) -> list[Scalar]:
+    """Angles in (-pi, pi], or one turn off where only that is within the limits (``limits.wrapped``)."""
+    angles = []
+    for x, low, high in zip(q, chain.lower.tolist(), chain.upper.tolist(), strict=True):
+        x = scalar.arc(scalar.sin(x), scalar.cos(x))
+        x = where(x <= CUT - math.pi, x + TURN, x)
+        angles.append(turn_within(x, low, high) if high > math.pi or low < -math.pi else x)
+    return angles
+
+
+@cached
+def limb_branches(chain: SerialChain, position: bool = False) -> Program:
     """All solutions of a limb's closed form, in the order of ``ik.solutions.ordered``."""
-    chain = Chain.of(robot, limb)
+    form = recognised(chain, position)
+    assert form is not None
+    what = "position" if position else "pose"
     recorder = Recorder(
-        identifier(robot.name, chain.limb, "ik"),
-        f"All solutions of {chain.limb} of {robot.name} for a pose of its tip in the base frame: inside the"
-        " limits first, then the nearest to a guess; NaN where there is none. error: what lacks to the pose"
-        " [m and rad, norm]; kind: 2 inside the limits, 1 outside, 0 none; sure: 1 if rounding leaves nothing"
-        " open.",
+        identifier(chain.limb, "ik", what),
+        f"All solutions of {chain.limb} for a {what} of its tip in the base frame: inside the limits first,"
+        " then the nearest to a guess; NaN where there is none. error: norm of the residual [m and rad];"
+        " kind: 2 inside the limits, 1 outside, 0 none; certified: 1 if rounding leaves nothing open.",
     )
-    target, guess = pose_input(recorder, "T_base_tip"), recorder.input("guess", len(chain.names))
-    near, rows, sure = [(scalar.sin(x), scalar.cos(x)) for x in guess], [], 1.0
-    for *q, slack in closed_form(chain).formula(target):
-        q, error = wrapped(chain, q), gap(chain, q, target)
+    target = _target_input(recorder, "target", position)
+    near = _sines(_clipped(chain, recorder.input("guess", len(chain.names))))
+    rows, certified = [], 1.0
+    for *angles, slack in form.formula(target):
+        q = wrapped(chain, angles)
+        error = miss(chain, q, target)
+        worst = _worst(chain, q)
         solves = error <= EXACT
-        sure = where(((slack > DOUBT) & solves) | ((slack < -DOUBT) & ~solves), sure, 0.0)
-        kind = where(solves, where(excess(chain, q)[0] <= WITHIN, 2.0, 1.0), 0.0)
+        clear = (slack > CLEAR) & solves & (abs_(worst - LIMIT_TOLERANCE) > NEAR_LIMIT)
+        certified = where(clear | ((slack < -CLEAR) & ~solves), certified, 0.0)
+        kind = where(solves, where(worst <= LIMIT_TOLERANCE, 2.0, 1.0), 0.0)
         apart = sum(1.0 - cosine for cosine in cosines(q, near))
         none = kind < 0.5
         shown = [where(none, math.nan, x) for x in q]
-        rows.append([apart - FARTHER * kind, kind, where(none, math.inf, error), *shown])
+        rows.append([apart - INSIDE * kind, kind, where(none, math.inf, error), *shown])
     rows = _sorted(rows)
+    for one, other in pairwise(rows):
+        certified = where((other[0] - one[0] > TIE) | (other[1] < 0.5), certified, 0.0)
     recorder.output("q", [x for _, _, _, *q in rows for x in q], len(rows), len(chain.names))
     recorder.output("error", [error for _, _, error, *_ in rows])
     recorder.output("kind", [kind for _, kind, *_ in rows])
-    recorder.output("sure", [where(rows[0][1] > 0.5, sure, 0.0)])
+    recorder.output("certified", [where(rows[0][1] > 0.5, certified, 0.0)])
     return recorder.program()
+
+
+def _target_input(recorder: Recorder, name: str, position: bool) -> Pose | Vector:
+    return Vector(*recorder.input(name, 3)) if position else pose_input(recorder, name)
+
+
+def _worst(chain: SerialChain, q: Sequence[Scalar]) -> Scalar:
+    """How far the joint furthest beyond its limits lies, negative inside."""
+    worst = -math.inf
+    for x, low, high in zip(q, chain.lower.tolist(), chain.upper.tolist(), strict=True):
+        if math.isfinite(low) or math.isfinite(high):
+            worst = larger(beyond(x, low, high), worst)
+    return worst
 
 
 def _sorted(rows: Sequence[list[Scalar]]) -> list[list[Scalar]]:
@@ -77,149 +125,125 @@ def _sorted(rows: Sequence[list[Scalar]]) -> list[list[Scalar]]:
     return rows
 
 
-def cosines(q: Sequence[Scalar], near: Sequence[tuple[Scalar, Scalar]]) -> list[Scalar]:
-    """Cosines of the angles' differences from others that are told by sine and cosine."""
-    return [scalar.sin(x) * s + scalar.cos(x) * c for x, (s, c) in zip(q, near, strict=True)]
+@cached
+def limb_pose(chain: SerialChain, position: bool = False) -> Program:
+    """The one solution of a limb that ``solve_pose`` takes, for a target in the world."""
+    recorder = Recorder(
+        identifier(chain.limb, "pose", "position" if position else "pose"),
+        f"Joint positions of {chain.limb} that put its tip at a target in the world frame: nearest to a guess"
+        " within the limits, else nearest to it. error: norm of the residual [m and rad]; inside: 1 if within"
+        " the limits; certified: 1 if rounding leaves nothing open and the limb is not singular.",
+    )
+    T = pose_input(recorder, "T_world_base")
+    wanted = _target_input(recorder, "target", position)
+    here = T.R.T @ (wanted - T.p) if isinstance(wanted, Vector) else T.inverse @ wanted
+    guess = recorder.input("guess", len(chain.names))
+    q, inside, clear, _ = _nearest(chain, here, guess)
+    error = miss(chain, q, here)
+    regular = abs_(limb_determinant(chain, q)) > determinant_bound(chain, SINGULAR)
+    recorder.output("q", q)
+    recorder.output("error", [error])
+    recorder.output("inside", [where(inside, 1.0, 0.0)])
+    recorder.output("certified", [where(clear & (error <= EXACT) & regular, 1.0, 0.0)])
+    return recorder.program()
 
 
-def excess(chain: Chain, q: Sequence[Scalar]) -> tuple[Scalar, Scalar]:
-    """How far the joint furthest beyond its limits lies, below 0 inside; and its index in the robot."""
-    joints = chain.joints
-    worst, index = -math.inf, float(joints[0])
-    for k, (x, low, high) in enumerate(zip(q, chain.lower.tolist(), chain.upper.tolist(), strict=True)):
-        for here in [low - x] * math.isfinite(low) + [x - high] * math.isfinite(high):
-            more = here > worst
-            worst, index = where(more, here, worst), where(more, float(joints[k]), index)
-    return worst, index
-
-
-@kept
 def limb_nearest(robot: Robot, limb: str) -> Program:
-    """The solution of a limb's closed form that is nearest to a guess."""
-    chain = Chain.of(robot, limb)
+    """The solution of a limb's closed form for a pose of its tip in the base frame; it is exported to C."""
+    chain = SerialChain.of(robot, limb)
     recorder = Recorder(
         identifier(robot.name, chain.limb, "nearest"),
-        f"The solution of {chain.limb} of {robot.name} nearest to a guess, for a pose of its tip in the base"
-        f" frame; error: what lacks to the pose [m and rad, norm]; {FOUND}.",
+        f"The solution of {chain.limb} of {robot.name} for a pose of its tip in the base frame: nearest to a"
+        " guess within the limits, else nearest to it; error: norm of the residual [m and rad];"
+        " found: 1 if there is a solution, 0 if there is none (then q is the guess), -1 if rounding leaves it"
+        " open.",
     )
     target, guess = pose_input(recorder, "T_base_tip"), recorder.input("guess", len(chain.names))
-    q, found = nearest_branch(chain, closed_form(chain).formula(target), guess)
-    recorder.output("q", q)
-    recorder.output("error", [gap(chain, q, target)])
-    recorder.output("found", [found])
+    q, _, clear, none = _nearest(chain, target, guess)
+    recorder.output("q", [where(none, old, new) for old, new in zip(guess, q, strict=True)])
+    recorder.output("error", [miss(chain, q, target)])
+    recorder.output("found", [where(none, 0.0, where(clear, 1.0, -1.0))])
     return recorder.program()
 
 
-@kept
-def solvable(robot: Robot, tip: str, pose: bool) -> bool:
-    """True if a limb's pose (or its tip's position) has a closed form."""
-    chain = Chain.of(robot, tip)
-    if not pose:
-        return shoulder_of(chain) is not None
-    try:
-        closed_form(chain)
-    except InputError:
-        return False
-    return True
+def _nearest(
+    chain: SerialChain, target: Pose | Vector, guess: Sequence[Scalar]
+) -> tuple[list[Scalar], Scalar, Scalar, Scalar]:
+    """The best branch: its positions; conditions: inside the limits, clear, and no branch at all.
 
-
-@kept
-def whole_body(robot: Robot, targets: tuple[tuple[str, bool], ...]) -> Program:
-    """Joint positions that put several tips where they are wanted, each limb by its closed form.
-
-    Args:
-        robot: limbs that share no joints.
-        targets: tips, and whether it is a pose (4, 4) that is wanted of each, or a position (3,).
+    Nearness is the sum of cosines over the joints, and limits are arcs of the circle: neither needs angles,
+    so that only one branch's are computed.
     """
-    recorder = Recorder(
-        identifier(robot.name, "pose"),
-        f"Joint positions of {robot.name} nearest to a guess that put base and tips where they are wanted,"
-        " world frame; for each target error: what lacks to it [m and rad, norm]; beyond: how far the joint"
-        " furthest beyond its limits lies, below 0 inside; worst: its index; sure: 1 if rounding leaves"
-        " nothing open.",
-    )
-    T, guess = pose_input(recorder, "T_world_base"), recorder.input("guess", len(robot.joints))
-    back, q = T.inverse, list(guess)
-    told: dict[str, list[Scalar]] = {"error": [], "beyond": [], "worst": [], "sure": []}
-    for tip, pose in targets:
-        chain = Chain.of(robot, tip)
-        name = identifier("target", tip)
-        if pose:
-            target = back @ pose_input(recorder, name)
-            branches = closed_form(chain).formula(target)
-        else:
-            wanted = T.R.T @ (Vector(*recorder.input(name, 3)) - T.p)
-            target, shoulder = Pose(UNTURNED, wanted), shoulder_of(chain)
-            assert shoulder is not None
-            branches = point_branches(chain.screws, shoulder, chain.tip.p, wanted)
-        own, found = nearest_branch(chain, branches, [guess[i] for i in chain.joints])
-        for i, x in zip(chain.joints, own, strict=True):
-            q[i] = x
-        error, (beyond, worst) = gap(chain, own, target, pose), excess(chain, own)
-        regular = abs_(limb_determinant(robot, chain, own)) > doubtful(chain, SINGULAR)
-        sure = (found > 0.5) & (error <= CLOSED * 1e-2) & regular
-        for values, value in zip(told.values(), (error, beyond, worst, where(sure, 1.0, 0.0)), strict=True):
-            values.append(value)
-    recorder.output("q", q)
-    for group, values in told.items():
-        recorder.output(group, values)
-    return recorder.program()
-
-
-def nearest_branch(
-    chain: Chain, branches: Sequence[Sequence[Scalar]], guess: Sequence[Scalar]
-) -> tuple[list[Scalar], Scalar]:
-    """Angles of the solution nearest to the guess, and whether it is one: 1, 0 (then the guess), -1 in doubt.
-
-    Nearness is the sum of (1 - cos) over the joints. It needs no angles: only one branch's are computed.
-    """
-    near = [(scalar.sin(x), scalar.cos(x)) for x in guess]
-    best: list[Scalar] = [-50.0, *(x for pair in near for x in pair)]
-    rival: Scalar = -50.0
-    for *q, slack in branches:
-        pairs = [(scalar.sin(x), scalar.cos(x)) for x in q]
-        alike = sum(cosines(q, near))
-        here = [where(slack > DOUBT, alike, -100.0), *(x for pair in pairs for x in pair)]
-        rival = where((abs_(slack) <= DOUBT) & (alike > rival), alike, rival)
-        better = here[0] > best[0]
+    form = recognised(chain, isinstance(target, Vector))
+    assert form is not None
+    held = _clipped(chain, guess)
+    near = _sines(held)
+    none, least_key = -4.0 * INSIDE, -3.0 * INSIDE
+    best: list[Scalar] = [none, *(x for pair in near for x in pair)]
+    second: Scalar = none
+    for *angles, slack in form.formula(target):
+        pairs = _sines(angles)
+        alike = sum(s * a + c * b for (s, c), (a, b) in zip(pairs, near, strict=True))
+        inside, decided = _inside(chain, pairs)
+        clear = (slack > CLEAR) & decided
+        key = alike + where(inside, INSIDE, 0.0)
+        shown = where(clear, key, none)
+        unclear = (abs_(slack) <= CLEAR) | ((slack > CLEAR) & ~decided)
+        better = shown > best[0]
+        second = larger(second, larger(where(better, best[0], shown), where(unclear, alike + INSIDE, none)))
+        here = [shown, *(x for pair in pairs for x in pair)]
         best = [where(better, new, old) for new, old in zip(here, best, strict=True)]
     score, *flat = best
-    q = [scalar.arc(s, c) for s, c in zip(flat[::2], flat[1::2], strict=True)]
-    none = (score < -40.0) & (rival < -40.0)
-    return wrapped(chain, q), where(none, 0.0, where(rival + 1e-6 > score, -1.0, 1.0))
+    ends = zip(held, flat[::2], flat[1::2], near, chain.lower.tolist(), chain.upper.tolist(), strict=True)
+    q = []
+    for start, s, c, (a, b), low, high in ends:
+        away = scalar.arc(s * b - c * a, c * b + s * a)
+        away = where(away <= CUT - math.pi, away + TURN, away)
+        q.append(turn_within(start + away, low, high))
+    inside = score > 0.5 * INSIDE
+    clear = (score > least_key) & (score - second > TIE)
+    return q, inside, clear, (score < least_key) & (second < least_key)
 
 
-def wrapped(chain: Chain, q: Sequence[Scalar]) -> list[Scalar]:
-    """Angles in (-pi, pi], or one turn off where only that is within the limits (``Chain.wrapped``)."""
-    turn, told = 2 * math.pi, []
-    for x, low, high in zip(q, chain.lower.tolist(), chain.upper.tolist(), strict=True):
-        x = scalar.arc(scalar.sin(x), scalar.cos(x))
-        if high > math.pi:
-            x = where((x < low) & (x + turn <= high), x + turn, x)
-        if low < -math.pi:
-            x = where((x > high) & (x - turn >= low), x - turn, x)
-        told.append(x)
-    return told
+def _inside(chain: SerialChain, pairs: Pairs) -> tuple[Scalar, Scalar]:
+    """Conditions: angles given by sine and cosine are within the limits; rounding cannot change that."""
+    inside, decided = None, None
+    for (s, c), low, high in zip(pairs, chain.lower.tolist(), chain.upper.tolist(), strict=True):
+        half = (high - low) / 2 + LIMIT_TOLERANCE
+        if half >= math.pi:
+            continue
+        middle = (low + high) / 2
+        margin = c * math.cos(middle) + s * math.sin(middle) - math.cos(half)
+        here, sure = margin >= 0, abs_(margin) > max(NEAR_LIMIT * math.sin(half), 1e-14)
+        inside = here if inside is None else inside & here
+        decided = sure if decided is None else decided & sure
+    if inside is None:
+        s, _ = pairs[0]
+        return s * s >= 0, s * s >= 0
+    return inside, decided
 
 
-def gap(chain: Chain, q: Sequence[Scalar], target: Pose, pose: bool = True) -> Scalar:
-    """What lacks to a pose [m and rad, norm] or to its position; small angles by their chord."""
-    D = AT_REST
-    for screw, x in zip(chain.screws, q, strict=True):
-        D = advance(D, screw, x)
-    miss = D @ chain.tip.p - target.p
-    if not pose:
-        return scalar.sqrt(dot(miss, miss))
-    R = D.R @ chain.tip.R
-    columns = zip((R.x, R.y, R.z), (target.R.x, target.R.y, target.R.z), strict=True)
-    chord = sum(dot(a - b, a - b) for a, b in columns) * 0.5
-    return scalar.sqrt(chord + dot(miss, miss))
+def determinant_bound(chain: SerialChain, tolerance: float) -> float:
+    """Determinant of a limb's screws above which their least singular value is above a tolerance.
+
+    The product of the other n - 1 singular values is at most that of a matrix with its Frobenius norm shared
+    equally, and the norm is bounded by how far every axis can be from the tip.
+    """
+    n = len(chain.screws)
+    square = sum((n > 3) + (lever / chain.length) ** 2 for lever in chain.levers)
+    return float(tolerance * (square / (n - 1)) ** ((n - 1) / 2))
 
 
-def limb_determinant(robot: Robot, chain: Chain, q: Sequence[Scalar]) -> Scalar:
+def limb_determinant(chain: SerialChain, q: Sequence[Scalar]) -> Scalar:
     """Determinant of a limb's screws, with velocities divided by its length (``limb_rates``)."""
     split = split_of(chain)
-    twists = seen_screws(chain, split, q, best_link(robot, chain.limb))
-    if len(twists) == 3:
-        return point_rates(twists, ZERO, chain.length)[1]
-    return pose_rates(twists, split, NO_TWIST, chain.length)[1]
+    if len(chain.screws) == 3:
+        return point_rates(seen_screws(chain, split, q, 2), ZERO, chain.length)[1]
+    joints = split.first + 1 if split else 3
+    return pose_rates(seen_screws(chain, split, q, joints), split, NO_TWIST, chain.length)[1]
+
+
+def limb_programs(chain: SerialChain) -> list[Program]:
+    """The programs of a limb's closed forms: what ``limb_ik`` and ``solve_pose`` run for it."""
+    kinds = [position for position in (False, True) if recognised(chain, position)]
+    return [make(chain, position) for position in kinds for make in (limb_branches, limb_pose)]

@@ -13,7 +13,35 @@ from collections.abc import Sequence
 from screwkin.algebra.scalar import Scalar, least, minus, times
 from screwkin.algebra.screws import Screw
 from screwkin.algebra.se3 import Pose, Vector, dot, rotate
+from screwkin.ik.family import Formulas
 from screwkin.ik.subproblems import level_turns, three_turns, two_turns
+from screwkin.kinematics.axis_geometry import listed, meeting, parallel
+from screwkin.kinematics.serial_chain import SerialChain
+
+
+def recognise(chain: SerialChain) -> Formulas | list[str]:
+    """The branches of a chain with a spherical hip, a knee and a universal ankle, or what it lacks."""
+    if faults := spherical_hip_faults(chain):
+        return faults
+    hip, ankle = meeting(chain, (0, 1, 2)), meeting(chain, (4, 5))
+    assert hip is not None
+    assert ankle is not None
+    return Formulas(lambda D: spherical_hip_branches(chain.screws, hip, ankle, D))
+
+
+def spherical_hip_faults(chain: SerialChain) -> list[str]:
+    """What keeps the chain from being a spherical hip, knee and universal ankle."""
+    faults = [
+        f"the axes of {listed(chain, pair)} are parallel"
+        for pair in ((0, 1), (1, 2), (4, 5))
+        if parallel(chain, *pair)
+    ]
+    faults += [
+        f"the axes of {listed(chain, joints)} do not meet in a point"
+        for joints in ((0, 1, 2), (4, 5))
+        if not faults and meeting(chain, joints) is None
+    ]
+    return faults
 
 
 def spherical_hip_branches(

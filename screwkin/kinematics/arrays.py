@@ -2,41 +2,104 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.scalar import is_jax
-from screwkin.compiler.run import common_batch
+from screwkin.compiler.run import as_rows, common_batch
 from screwkin.errors import ShapeError
-from screwkin.kinematics.formula import axes
 from screwkin.kinematics.rigid import foreign
-from screwkin.model.robot import Robot
-from screwkin.model.state import State
+
+SHORT = ("float16", "bfloat16", "float32")
+"""Floats with too few digits for positions: refused, not converted silently."""
+
+
+@dataclass(frozen=True, eq=False)
+class Argument:
+    """An array that a program takes.
+
+    Attributes:
+        name: in the program.
+        label: in messages.
+        shape: its trailing shape.
+        rigid: it is a pose.
+        of: what it is about, where it is one of several.
+    """
+
+    name: str
+    label: str
+    shape: tuple[int, ...]
+    rigid: bool = False
+    of: str = ""
+
+
+def input_rows(arguments: Sequence[Argument], arrays: Sequence[Any]) -> tuple[list[Array], tuple[int, ...]]:
+    """Arrays as C-contiguous rows (count, size) of their common batch, whatever their values; and the batch.
+
+    Raises:
+        ShapeError: a wrong shape or kind, or batches that do not fit.
+    """
+    shaped = [of_shape(a.label, array, *a.shape) for a, array in zip(arguments, arrays, strict=True)]
+    batch = one_batch({a.label: (x, len(a.shape)) for a, x in zip(arguments, shaped, strict=True)})
+    return [as_rows(x, batch, a.shape) for a, x in zip(arguments, shaped, strict=True)], batch
+
+
+def checked_inputs(
+    arguments: Sequence[Argument], arrays: Sequence[Any]
+) -> tuple[list[Array], tuple[int, ...]]:
+    """The arrays, checked in every respect, and their common batch.
+
+    Raises:
+        ShapeError: a wrong shape, NaN or infinity, a pose that is not rigid, or batches that do not fit.
+    """
+    found = [checked(a.label, array, *a.shape) for a, array in zip(arguments, arrays, strict=True)]
+    batch = one_batch({a.label: (x, len(a.shape)) for a, x in zip(arguments, found, strict=True)})
+    for argument, array in zip(arguments, found, strict=True):
+        if argument.rigid:
+            rigid(argument.label, array)
+    return found, batch
 
 
 def checked(name: str, array: Any, *shape: int) -> Array:
     """The array as float64 NumPy or as JAX, with its trailing shape and its values checked.
 
     Raises:
-        ShapeError: wrong trailing shape, NaN or infinity, or a float32 JAX array.
+        ShapeError: wrong trailing shape, NaN or infinity, or JAX floats of less than 64 bits.
+    """
+    array = of_shape(name, array, *shape)
+    if not is_jax(array) and not np.isfinite(array).all():
+        raise ShapeError(f"{name} holds NaN or infinity; every number must be finite")
+    return array
+
+
+def of_shape(name: str, array: Any, *shape: int) -> Array:
+    """The array as float64 NumPy or as JAX, with its trailing shape checked.
+
+    Raises:
+        ShapeError: wrong trailing shape, no array of numbers, or floats of less than 64 bits.
     """
     if is_jax(array):
-        if array.dtype == np.float32:
+        if array.dtype.name in SHORT:
             raise ShapeError(
-                f'{name} is a float32 JAX array; switch on jax.config.update("jax_enable_x64", True)'
+                f'{name} is a {array.dtype} JAX array; switch on jax.config.update("jax_enable_x64", True)'
             )
-    else:
+    elif type(array) is not np.ndarray or array.dtype != float:
         try:
             if array is None:
                 raise TypeError("it is None")
+            if getattr(array, "dtype", None) is not None and array.dtype.name in SHORT:
+                raise ShapeError(
+                    f"{name} is a {array.dtype} array; convert it by .astype(float): it has too few digits"
+                )
             array = np.asarray(array, dtype=float)
         except (TypeError, ValueError) as error:
+            if isinstance(error, ShapeError):
+                raise
             raise ShapeError(f"{name} is not an array of numbers: {error}") from None
-        if not np.isfinite(array).all():
-            raise ShapeError(f"{name} holds NaN or infinity; every number must be finite")
     if array.shape[array.ndim - len(shape) :] != shape or array.ndim < len(shape):
         wanted = ", ".join(["...", *map(str, shape)])
         raise ShapeError(f"{name} has shape {tuple(array.shape)}, expected ({wanted})")
@@ -59,33 +122,6 @@ def rigid(name: str, T: Array) -> Array:
             "right-handed 3 x 3 rotation and the last row 0 0 0 1"
         )
     return T
-
-
-Told = tuple[str, Any, int]
-"""An argument: its name for messages, its value, and the size of its last axis."""
-
-
-def told(robot: Robot, state: State, more: Mapping[str, Told] | None = None) -> dict[str, Array]:
-    """The inputs of a formula by their names on its tape, checked: a state, and more.
-
-    Raises:
-        ShapeError: a wrong shape, NaN or infinity, a base pose that is not rigid, or batches that do not fit.
-    """
-    found = {
-        "T_world_base": checked("state.T_world_base", state.T_world_base, 4, 4),
-        "q": checked("state.q", state.q, len(robot.joints)),
-    }
-    names = {"T_world_base": "state.T_world_base", "q": "state.q"}
-    for key, (name, value, size) in (more or {}).items():
-        found[key], names[key] = checked(name, value, size), name
-    one_batch({names[key]: (a, axes(key)) for key, a in found.items()})
-    rigid("state.T_world_base", found["T_world_base"])
-    return found
-
-
-def or_rest(twist: Any) -> Any:
-    """A twist or its derivative, zero where none is told."""
-    return np.zeros(6) if twist is None else twist
 
 
 def one_batch(arrays: Mapping[str, tuple[Array, int]]) -> tuple[int, ...]:

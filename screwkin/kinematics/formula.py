@@ -1,97 +1,256 @@
-"""Formulas told once on a tape: recorded as a program for NumPy arrays, or computed at once for any others.
+"""One definition makes a quantity: checks, arrays of any batch, the program and JAX's rules follow from it.
 
-A formula asks its tape for inputs by name and gives it outputs by name. ``program.Recorder`` is the tape that
-hands out graph scalars and keeps what is done with them; ``Values`` hands out arrays.
+A formula maps records of scalars (``algebra.se3``) to records, and its annotations say how arrays are read::
+
+    @formula
+    def center_of_mass(robot: Robot, T_world_base: Pose, q: Joints) -> Vector: ...
+
+``center_of_mass(robot, state)`` takes and returns arrays, ``center_of_mass.formula`` is the function itself,
+for scalars of any kind, and ``center_of_mass.program(robot)`` its straight-line program.
 """
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Hashable, Mapping, Sequence
-from typing import Any
+from functools import wraps
+from typing import Any, Protocol, get_type_hints
+from weakref import WeakKeyDictionary
+
+import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.algebra.scalar import Scalar, is_jax, is_symbolic
-from screwkin.algebra.se3 import as_array, leaves, unstack
-from screwkin.compiler.program import Group, Program, Recorder, kept
-from screwkin.compiler.run import common_batch, run
+from screwkin.algebra.scalar import Scalar
+from screwkin.algebra.se3 import as_array, unstack
+from screwkin.compiler.program import Program, Recorder
+from screwkin.compiler.records import identifier
+from screwkin.errors import InputError
+from screwkin.kinematics.arrays import Argument, checked_inputs
+from screwkin.kinematics.door import Door
+from screwkin.kinematics.kinds import KINDS, STATE, Kind, documented, flattened, kind_of
 from screwkin.model.robot import Robot
+from screwkin.model.state import State
+
+Values = Mapping[str, Any]
+"""Arguments of a quantity by name."""
+Given = str | tuple[str, tuple[Argument, ...]]
+"""An argument that is given as an array, by its name; of a mapping, with the arrays in it."""
+Results = dict[str, tuple[tuple[int, ...], list[Scalar]]]
+"""Shape and scalars, row by row, of every result by name."""
 
 
-def axes(name: str) -> int:
-    """Axes of a formula's input behind its batch: a pose has two, all others one."""
-    return 2 if name == "T_world_base" else 1
+class Quantity(Protocol):
+    """A function of arrays that a formula defines; ``definition`` is what programs and loops are made of."""
+
+    __name__: str
+    __doc__: str | None
+    formula: Callable[..., Any]
+    definition: Definition
+
+    def __call__(self, subject: Any, state: State, *args: Any, **options: Any) -> Array:
+        """The quantity at states with any leading batch dimensions."""
+
+    def program(self, subject: Any, *choices: Any, optional: Sequence[str] = ()) -> Program:
+        """The straight-line program; ``optional`` names arguments with a default that are arrays."""
 
 
-class Values:
-    """A tape of arrays, NumPy or JAX: formulas compute as they are told."""
+def formula(function: Callable[..., Any]) -> Quantity:
+    """The quantity of a formula; see the module."""
+    definition = Definition(function)
 
-    def __init__(self, told: Mapping[str, Array]) -> None:
-        self._told = told
-        self._inputs: list[tuple[Group, Array]] = []
-        self._results: list[tuple[Group, Sequence[Scalar]]] = []
+    @wraps(function)
+    def quantity(*args: Any, **options: Any) -> Any:
+        return definition(args, options)
 
-    def title(self, name: str, about: str) -> None:
-        """Nothing to be named."""
+    public: Any = quantity
+    public.definition, public.formula, public.program = definition, function, definition.program
+    public.__doc__ = documented(function.__doc__ or "", definition.kinds)
+    public.__signature__, public.__annotations__ = definition.signature, {"return": "Array"}
+    made: Quantity = public
+    return made
 
-    def input(self, name: str, *shape: int) -> list[Scalar]:
-        """The scalars of an array that was told."""
-        array, group = self._told[name], Group(name, shape)
-        self._inputs.append((group, array))
-        batch = array.shape[: array.ndim - len(shape)]
-        return unstack(array.reshape(*batch, group.size))
 
-    def output(self, name: str, values: Any, *shape: int) -> None:
-        """What has been computed."""
-        flat = [leaf for value in values for leaf in leaves(value)]
-        self._results.append((Group(name, shape or (len(flat),)), flat))
+def robot_of(subject: Any) -> Any:
+    """The robot that a subject (a robot, a mechanism) is about; the subject itself if it is neither."""
+    return getattr(subject, "robot", subject)
 
-    def arrays(self) -> dict[str, Array]:
-        """Every output (*batch, *shape)."""
-        groups, told = zip(*self._inputs, strict=True)
-        batch = common_batch(told, [len(group.shape) for group in groups])
-        return {
-            group.name: as_array(flat, batch).reshape(*batch, *group.shape) for group, flat in self._results
+
+class Definition:
+    """What the annotations of a formula say: which arguments are arrays, and which are choices.
+
+    Programs are cached for as long as the robot lives. They are the same for equal choices, whoever asks.
+
+    Attributes:
+        name: of the quantity.
+        kinds: of the arguments that are arrays, by name.
+        choices: names of the other arguments: each is a value that is part of the program.
+        optional: names of arrays that may be None.
+        signature: of the function of arrays.
+        parameters: its parameters' names.
+        defaults: its default values.
+        arrays_by_default: names of the arrays that have one.
+    """
+
+    def __init__(self, function: Callable[..., Any]) -> None:
+        self.function, self.name = function, function.__name__
+        hints = get_type_hints(function, include_extras=True)
+        subject, *parameters = inspect.signature(function).parameters.values()
+        self.kinds: dict[str, Kind] = {
+            p.name: KINDS[kind] for p in parameters if (kind := kind_of(hints[p.name])) in KINDS
         }
+        self.choices = tuple(p.name for p in parameters if p.name not in self.kinds)
+        self.optional = {name for name in self.kinds if kind_of(hints[name]) is not hints[name]}
+        public = [
+            p.replace(annotation="ArrayLike" if p.name in self.kinds else p.annotation)
+            for p in parameters
+            if p.name not in STATE
+        ]
+        state = inspect.Parameter("state", inspect.Parameter.POSITIONAL_OR_KEYWORD, annotation="State")
+        self.signature = inspect.Signature([subject, state, *public], return_annotation="Array")
+        self.parameters = tuple(self.signature.parameters)
+        self.defaults = {p.name: p.default for p in public if p.default is not inspect.Parameter.empty}
+        self.arrays_by_default = tuple(name for name in self.defaults if name in self.kinds)
+        self._doors: WeakKeyDictionary[Robot, dict[Hashable, Door]] = WeakKeyDictionary()
 
+    def __call__(self, args: Sequence[Any], options: Values) -> Any:
+        """The quantity as an array, or as arrays by name."""
+        values = self._bound(args, options)
+        subject = values[self.parameters[0]]
+        given, arrays = self._given(subject, values)
+        choices = tuple([values[name] for name in self.choices])
+        if robot_of(subject).is_symbolic:
+            return self.by_formula(subject, given, choices, arrays)
+        door = self.door(subject, given, choices)
+        found = door(arrays)
+        return found[0] if door.names == [self.name] else dict(zip(door.names, found, strict=True))
 
-class Formula:
-    """A map without iteration of what is told on a tape, for a robot and some choices."""
+    def program(self, subject: Any, *choices: Any, optional: Sequence[str] = ()) -> Program:
+        """The program of a robot; ``optional`` names arguments with a default that are arrays."""
+        return self.door(subject, self.inputs(subject, optional), self.chosen(choices)).program
 
-    def __init__(self, tell: Callable[..., None]) -> None:
-        self.__doc__, self._tell = tell.__doc__, tell
-        self.program = kept(self._recorded)
+    def chosen(self, choices: Sequence[Any]) -> tuple[Any, ...]:
+        """Choices completed by defaults.
 
-    def _recorded(self, robot: Robot, *about: Hashable) -> Program:
-        recorder = Recorder()
-        self._tell(recorder, robot, *about)
-        return recorder.program()
-
-    def values(self, robot: Robot, *about: Hashable, told: Mapping[str, Array]) -> dict[str, Array]:
-        """Every output, by the formula itself over arrays."""
-        tape = Values(told)
-        self._tell(tape, robot, *about)
-        return tape.arrays()
-
-    def __call__(self, robot: Robot, *about: Hashable, told: Mapping[str, Array]) -> dict[str, Array]:
-        """Every output by name, (*batch, *shape).
-
-        By the program; of a robot of symbols by the formula.
+        Raises:
+            InputError: too many, or one without default is missing.
         """
-        if any(is_jax(array) for array in told.values()):
-            from screwkin.compiler import xla_call
+        rest = self.choices[len(choices) :]
+        missing = [name for name in rest if name not in self.defaults]
+        if missing or len(choices) > len(self.choices):
+            wanted = ", ".join([repr(self.name), *self.choices])
+            raise InputError(f"{self.name} has the choices ({wanted}), not {len(choices)} of them")
+        return (*choices, *(self.defaults[name] for name in rest))
 
-            return xla_call.run(self.program(robot, *about), told)
-        if not is_symbolic_robot(robot):
-            return run(self.program(robot, *about), told)
-        return self.values(robot, *about, told=told)
+    def inputs(self, subject: Any, optional: Sequence[str] = ()) -> tuple[Given, ...]:
+        """The arguments that are arrays, where none is at hand yet: those without a default, and some."""
+        given: list[Given] = []
+        for name, kind in self.kinds.items():
+            if name not in self.defaults or name in optional:
+                parts = kind.parts and kind.parts(robot_of(subject), name, True)[0]
+                given.append((name, parts) if parts is not None else name)
+        return tuple(given)
 
+    def door(self, subject: Any, given: tuple[Given, ...], choices: tuple[Any, ...]) -> Door:
+        """The program behind its checks, made once for a robot, its given arguments and choices."""
+        robot = robot_of(subject)
+        doors = self._doors.get(robot)
+        if doors is None:
+            doors = self._doors.setdefault(robot, {})
+        key = (getattr(subject, "choice", None), given, choices)
+        door = doors.get(key)
+        if door is None:
+            default = map(self.defaults.get, self.choices)
+            words = [str(c) for c, usual in zip(choices, default, strict=True) if c != usual]
+            about = (self.function.__doc__ or self.name).split("\n")[0].replace("``", "")
+            recorder = Recorder(identifier(robot.name, *words, self.name), about)
+            for name, (shape, flat) in self.traced(recorder, subject, given, choices).items():
+                recorder.output(name, flat, *shape)
+            arguments = [a for own in self.arguments(robot, given).values() for a in own]
+            door = doors[key] = Door(recorder, arguments)
+        return door
 
-@kept
-def is_symbolic_robot(robot: Robot) -> bool:
-    """True if any number of the robot is a symbol."""
-    records = [x for link in robot.links for x in (link.com, link.inertia, link.frame)]
-    records += [x for joint in robot.joints for x in (joint.screw.s, joint.screw.s0)]
-    records += [limb.frame for limb in robot.limbs]
-    scalars = [leaf for record in records for leaf in leaves(record)]
-    scalars += [link.mass for link in robot.links] + [joint.screw.pitch for joint in robot.joints]
-    return any(map(is_symbolic, scalars))
+    def traced(
+        self, recorder: Recorder, subject: Any, given: Sequence[Given], choices: Sequence[Any]
+    ) -> Results:
+        """The formula on a recorder's scalars; inputs of the same names are shared."""
+        records = {}
+        for name, arguments in self.arguments(robot_of(subject), given).items():
+            scalars = [recorder.shared(a.name, *a.shape) for a in arguments]
+            records[name] = self.kinds[name].record(arguments, scalars)
+        return self._results(subject, records, choices)
+
+    def arguments(self, robot: Robot, given: Sequence[Given]) -> dict[str, list[Argument]]:
+        """By the name of every given argument, the arrays that it consists of."""
+        found: dict[str, list[Argument]] = {}
+        for entry in given:
+            if isinstance(entry, str):
+                label, shape = f"state.{entry}" if entry in STATE else entry, self.kinds[entry].shape(robot)
+                found[entry] = [Argument(entry, label, shape, rigid=entry == "T_world_base")]
+            else:
+                name, parts = entry
+                found[name] = list(parts)
+        return found
+
+    def _bound(self, args: Sequence[Any], options: Values) -> dict[str, Any]:
+        """Every argument by name: as ``inspect`` binds them, in a tenth of its time."""
+        values = {**self.defaults, **dict(zip(self.parameters, args, strict=False)), **options}
+        twice = options and not options.keys().isdisjoint(self.parameters[: len(args)])
+        if twice or len(values) != len(self.parameters) or len(args) > len(self.parameters):
+            self.signature.bind(*args, **options)  # raises
+        return values
+
+    def _given(self, subject: Any, values: Values) -> tuple[tuple[Given, ...], list[Any]]:
+        """Which arguments are given as arrays, and the arrays.
+
+        Raises:
+            InputError: no robot, or no State.
+        """
+        robot, state = robot_of(subject), values["state"]
+        if not isinstance(robot, Robot):
+            what = self.parameters[0]
+            wanted = "load_robot(...)" if what == "robot" else "closed_mechanism(robot)"
+            raise InputError(f"{self.name} takes a {what} from {wanted}, not {type(subject).__name__}")
+        if not isinstance(state, State):
+            raise InputError(f"{self.name} takes State(T_world_base, q), not {type(state).__name__}")
+        given: list[Given] = []
+        arrays: list[Any] = []
+        for name, kind in self.kinds.items():
+            value = getattr(state, name) if name in STATE else values[name]
+            if value is None and name in self.optional:
+                continue
+            if kind.parts is None:
+                given.append(name)
+                arrays.append(value)
+            else:
+                parts, own = kind.parts(robot, name, value)
+                given.append((name, parts))
+                arrays += own
+        return tuple(given), arrays
+
+    def _results(self, subject: Any, records: Values, choices: Sequence[Any]) -> Results:
+        absent = dict.fromkeys(self.optional - records.keys())
+        chosen = dict(zip(self.choices, choices, strict=True))
+        value = self.function(subject, **records, **absent, **chosen)
+        named = value if isinstance(value, dict) else {self.name: value}
+        return {name: flattened(one) for name, one in named.items()}
+
+    def by_formula(
+        self, subject: Any, given: Sequence[Given], choices: Sequence[Any], arrays: list[Any]
+    ) -> Any:
+        """The formula itself over arrays, of a robot of symbols."""
+        arguments = self.arguments(robot_of(subject), given)
+        every = [a for own in arguments.values() for a in own]
+        arrays, batch = checked_inputs(every, arrays)
+        scalars = {
+            a.name: unstack(np.reshape(x, (*x.shape[: x.ndim - len(a.shape)], -1)))
+            for a, x in zip(every, arrays, strict=True)
+        }
+        records = {
+            name: self.kinds[name].record(own, [scalars[a.name] for a in own])
+            for name, own in arguments.items()
+        }
+        found = {
+            name: as_array(flat, batch).reshape(*batch, *shape)
+            for name, (shape, flat) in self._results(subject, records, choices).items()
+        }
+        return found.get(self.name, found)

@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cache
-
-import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.scalar import Scalar, abs_, where
 from screwkin.algebra.se3 import Pose, Rotation, Vector, cross, dot
 from screwkin.compiler.program import Program, Recorder
 from screwkin.compiler.records import matrix
-from screwkin.compiler.run import python_function, run
+from screwkin.compiler.run import run
 from screwkin.model.state import RIGID
 
 
 def foreign(T: Array) -> Array:
     """Which of the matrices (..., 4, 4) are no rigid displacements (...,)."""
-    if T.ndim == 2:  # what a loop over samples asks: without the cost of arrays
-        ((deviation,),) = python_function(poses(False))(T.ravel().tolist())
-        return np.asarray(deviation > RIGID)
     return run(poses(False), {"T": T})["deviation"][..., 0] > RIGID
 
 
@@ -44,15 +40,21 @@ def poses(exact: bool) -> Program:
     recorder = Recorder("exact_poses" if exact else "poses", "How far a matrix is from a pose.")
     T = recorder.input("T", 4, 4)
     R = Rotation(*(Vector(*T[c:12:4]) for c in range(3)))
+    recorder.output("deviation", [deviation(T)])
+    if exact:
+        recorder.output("pose", matrix(Pose(_nearer(_nearer(R)), Vector(*T[3:12:4]))), 4, 4)
+    return recorder.program()
+
+
+def deviation(T: Sequence[Scalar]) -> Scalar:
+    """How far sixteen scalars, row by row, are from a rigid pose: see ``poses``."""
+    R = Rotation(*(Vector(*T[c:12:4]) for c in range(3)))
     gram = _gram(R)
     entries = [gram[0] - 1, gram[1] - 1, gram[2] - 1, *gram[3:], *T[12:15], T[15] - 1]
     worst: Scalar = 0.0
     for entry in map(abs_, entries):
         worst = where(entry > worst, entry, worst)
-    recorder.output("deviation", [where(dot(R.x, cross(R.y, R.z)) > 0.0, worst, math.inf)])
-    if exact:
-        recorder.output("pose", matrix(Pose(_nearer(_nearer(R)), Vector(*T[3:12:4]))), 4, 4)
-    return recorder.program()
+    return where(dot(R.x, cross(R.y, R.z)) > 0.0, worst, math.inf)
 
 
 def _gram(R: Rotation) -> list[Scalar]:

@@ -1,31 +1,48 @@
-"""A limb as a serial chain told in the base frame: its screws, its tip, its limits; forward over arrays."""
+"""A limb as a serial chain expressed in the base frame: its screws, its tip, its limits; and where it leads.
+
+Formulas run over any scalar; ``residual`` and ``distance`` are their array functions. Which point of an axis
+a table names means nothing: every axis is given by its point nearest to the next one towards the tip.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, field, fields, replace
+from functools import wraps
+from itertools import pairwise
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.algebra.scalar import Scalar, sqrt
-from screwkin.algebra.screws import Screw, at, displacement, transport
+from screwkin.algebra.scalar import Scalar, is_symbolic, sqrt, structural
+from screwkin.algebra.screws import AT_REST, Screw, advance, at, displacement, transport
 from screwkin.algebra.se3 import (
     IDENTITY,
     Pose,
     Twist,
+    Vector,
     as_array,
     dot,
+    leaves,
     norm,
     pose_from_array,
     rotation_log,
     unstack,
+    vector_from_array,
 )
+from screwkin.compiler.program import kept
+from screwkin.kinematics import limits
 from screwkin.model.robot import Robot
+
+P = ParamSpec("P")
+T = TypeVar("T")
+SMALLEST = 1e-3
+"""Least size of a limb [m]."""
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class SerialChain:
     """The joints from the base to a limb's tip.
 
     Attributes:
@@ -36,8 +53,9 @@ class Chain:
         tip: pose of the tip in the zero pose, base frame.
         lower: limits (n,) [rad or m].
         upper: limits (n,).
-        turning: (n,) bool, False for prismatic joints, whose positions are not wrapped.
-        length: size of the limb [m]; it makes positions comparable with angles.
+        turning: (n,) bool, False for prismatic and helical joints, whose positions are not wrapped.
+        length: size of the limb [m], the way from axis to axis to the tip; it makes positions comparable
+            with angles.
     """
 
     limb: str
@@ -49,32 +67,23 @@ class Chain:
     upper: Array
     turning: Array
     length: float
+    memo: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False)
+
+    def __reduce__(self) -> Any:
+        """For pickles and copies: without what is cached."""
+        return SerialChain, tuple(getattr(self, f.name) for f in fields(self) if f.init)
 
     @classmethod
-    def of(cls, robot: Robot, limb: str) -> Chain:
+    def of(cls, robot: Robot, limb: str) -> SerialChain:
         """The chain of a limb, by its name or its tip's.
 
         Raises:
             UnknownNameError: no such limb.
         """
-        chosen = robot.limb(limb)
-        path = robot.path_to(chosen.link)
-        joints = [robot.joints[i] for i in path]
-        spread = [float(norm(chosen.frame.p - joint.screw.s0)) for joint in joints]
-        return cls(
-            chosen.name,
-            tuple(joint.name for joint in joints),
-            path,
-            tuple(joint.screw for joint in joints),
-            chosen.frame,
-            np.array([joint.lower for joint in joints], dtype=float),
-            np.array([joint.upper for joint in joints], dtype=float),
-            np.array([not joint.screw.is_translation and joint.type == "revolute" for joint in joints]),
-            max(1e-3, *spread),
-        )
+        return _chain(robot, robot.limb(limb).name)
 
     @property
-    def reversed(self) -> Chain:
+    def reversed(self) -> SerialChain:
         """The same chain walked from its tip link to the base, which moves it by the inverse.
 
         Its joint positions are the same ones in the opposite order, and its tip is the base frame itself.
@@ -91,22 +100,99 @@ class Chain:
             turning=self.turning[::-1],
         )
 
-    def beyond(self, q: Array) -> Array:
-        """(...,) how far the worst joint of q (..., n) lies beyond its limits [rad or m], 0 inside."""
-        return np.maximum(self.lower - q, q - self.upper).max(axis=-1).clip(min=0.0)
+    @property
+    def levers(self) -> list[float]:
+        """For every joint, a bound of its axis's distance from the tip in any position [m]."""
+        places = [*(screw.s0 for screw in self.screws), self.tip.p]
+        steps = [float(norm(b - a)) for a, b in pairwise(places)]
+        return np.cumsum(steps[::-1])[::-1].tolist()
+
+    def excess(self, q: Array) -> Array:
+        """(...,) how far the worst joint of q (..., n) lies beyond its limits, negative inside."""
+        return limits.excess(q, self.lower, self.upper)
 
     def within(self, q: Array) -> Array:
-        """(...,) bool: every joint of q (..., n) inside its limits, to 1e-9."""
-        return self.beyond(q) <= 1e-9
+        """(...,) bool: every joint of q (..., n) inside its limits, to ``limits.LIMIT_TOLERANCE``."""
+        return limits.within(q, self.lower, self.upper)
 
     def wrapped(self, q: Array) -> Array:
         """The same positions, angles in (-pi, pi] or one turn off where only that is in the limits."""
-        turn = 2 * np.pi
-        far = self.turning & ((q > np.pi) | (q <= -np.pi))
-        q = np.where(far, np.pi - (np.pi - q) % turn, q)
-        up = self.turning & (q < self.lower) & (q + turn <= self.upper)
-        down = self.turning & (q > self.upper) & (q - turn >= self.lower)
-        return np.where(up, q + turn, np.where(down, q - turn, q))
+        return limits.wrapped(q, self.lower, self.upper, self.turning)
+
+    def nearest_turn(self, q: Array, guess: Array) -> Array:
+        """The same positions by the turns nearest to a guess, within the limits where any is."""
+        return limits.nearest_turn(q, guess, self.lower, self.upper, self.turning)
+
+
+def cached(function: Callable[Concatenate[SerialChain, P], T]) -> Callable[Concatenate[SerialChain, P], T]:
+    """A function of a chain and of hashable arguments, computed once for as long as the chain is there."""
+
+    @wraps(function)
+    def once(chain: SerialChain, *about: P.args, **named: P.kwargs) -> T:
+        key = (function, about, *named.items())
+        if key not in chain.memo:
+            chain.memo[key] = function(chain, *about, **named)
+        value: T = chain.memo[key]
+        return value
+
+    return once  # type: ignore[return-value]
+
+
+@kept
+def _chain(robot: Robot, limb: str) -> SerialChain:
+    chosen = robot.limb(limb)
+    path = robot.path_to(chosen.link)
+    joints = [robot.joints[i] for i in path]
+    lower, upper = (end[list(path)] for end in limits.limits_of(robot))
+    turning = np.array([joint.type == "revolute" for joint in joints], dtype=bool)
+    for array in (lower, upper, turning):
+        array.flags.writeable = False
+    screws = nearest_points([joint.screw for joint in joints], chosen.frame.p)
+    places = [*(screw.s0 for screw in screws), chosen.frame.p]
+    size = sum(_number(norm(b - a)) for a, b in pairwise(places))
+    sliding = [joint.screw.is_translation for joint in joints]
+    size += sum(float(way) for way in (upper - lower)[sliding] if np.isfinite(way))
+    return SerialChain(
+        chosen.name,
+        tuple(joint.name for joint in joints),
+        path,
+        screws,
+        chosen.frame,
+        lower,
+        upper,
+        turning,
+        max(SMALLEST, size),
+    )
+
+
+def _number(x: Scalar) -> float:
+    return 0.0 if is_symbolic(x) else float(x)
+
+
+def nearest_points(screws: Sequence[Screw], tip: Vector) -> tuple[Screw, ...]:
+    """The same axes, each through its point nearest to that of the next one; the last nearest to the tip.
+
+    These points do not depend on joint positions, nor on which points a table names.
+    """
+    near, found = tip, list[Screw]()
+    for screw in reversed(screws):
+        if any(is_symbolic(x) for x in leaves(screw.s0 - near)):
+            near = screw.s0
+        elif screw.is_translation:
+            pass
+        else:
+            near = _slid(screw, float(dot(screw.s, near - screw.s0)))
+        found.insert(0, Screw(screw.s, near, screw.pitch))
+    return tuple(found)
+
+
+def _slid(screw: Screw, along: float) -> Vector:
+    """The point of an axis that far from s0; what rounding leaves of a zero is none."""
+    rounding = 4e-16 * max(1.0, abs(along))
+    if abs(along) <= rounding:
+        return screw.s0
+    moved = screw.s0 + screw.s * along
+    return Vector(*(structural(0.0 if abs(x) <= rounding else x) for x in moved))
 
 
 def forward(screws: Sequence[Screw], thetas: Sequence[Scalar], tip: Pose) -> tuple[Pose, list[Twist]]:
@@ -118,8 +204,47 @@ def forward(screws: Sequence[Screw], thetas: Sequence[Scalar], tip: Pose) -> tup
     return before @ tip, columns
 
 
-def missing(chain: Chain, q: Array, target: Array) -> tuple[Array, Array]:
-    """What lacks to the target, and how the tip moves.
+def separation(chain: SerialChain, q: Sequence[Scalar], target: Pose | Vector) -> tuple[Scalar, Scalar]:
+    """How far the tip is from a pose or a position, any scalar.
+
+    Returns:
+        Squared sine of half the angle between the orientations (0 for a position), squared distance [m^2].
+    """
+    D = AT_REST
+    for screw, theta in zip(chain.screws, q, strict=True):
+        D = advance(D, screw, theta)
+    if isinstance(target, Vector):
+        apart = D @ chain.tip.p - target
+        return 0, dot(apart, apart)
+    R, apart = D.R @ chain.tip.R, D @ chain.tip.p - target.p
+    columns = zip((R.x, R.y, R.z), (target.R.x, target.R.y, target.R.z), strict=True)
+    return sum(dot(a - b, a - b) for a, b in columns) / 8, dot(apart, apart)
+
+
+def miss(chain: SerialChain, q: Sequence[Scalar], target: Pose | Vector) -> Scalar:
+    """Norm of the residual [m and rad] on any scalar; large angles are given by their chord."""
+    half, far = separation(chain, q, target)
+    return sqrt(4 * half + far)
+
+
+def distance(chain: SerialChain, q: Array, target: Array) -> Array:
+    """(B,) norm of the residual [m and rad] of q (B, n) for poses (B, 4, 4) or positions (B, 3).
+
+    The angle of the missing rotation is taken from the chord between the two rotations, which is exact also
+    where the angle is small and costs less than its axis.
+    """
+    half, far = separation(chain, unstack(q), target_of(target))
+    turn = 2 * np.arcsin(np.minimum(np.sqrt(half), 1.0))
+    return np.asarray(np.sqrt(turn * turn + far))
+
+
+def target_of(target: Array) -> Pose | Vector:
+    """Poses (B, 4, 4) or positions (B, 3) as a record."""
+    return vector_from_array(target) if target.ndim == 2 else pose_from_array(target)
+
+
+def residual(chain: SerialChain, q: Array, target: Array) -> tuple[Array, Array]:
+    """What separates the tip from its target, and how the tip moves.
 
     Args:
         chain: n joints.
@@ -127,7 +252,7 @@ def missing(chain: Chain, q: Array, target: Array) -> tuple[Array, Array]:
         target: poses (B, 4, 4), or positions (B, 3) with the orientation free.
 
     Returns:
-        error (B, 6): rotation vector and translation [rad, m] from the tip to the target, base axes;
+        residual (B, 6): rotation vector and translation [rad, m] from the tip to the target, base axes;
         Jacobian (B, 6, n), rows [omega; v of the tip's origin]. For positions the last three rows only.
     """
     count = (len(q),)
@@ -138,19 +263,3 @@ def missing(chain: Chain, q: Array, target: Array) -> tuple[Array, Array]:
     wanted = pose_from_array(target)
     turn = rotation_log(wanted.R @ tip.R.T)
     return np.concatenate([as_array(turn, count), as_array(wanted.p - tip.p, count)], axis=1), J
-
-
-def distance(chain: Chain, q: Array, target: Array) -> Array:
-    """(B,) norm of what lacks to the target poses (B, 4, 4) [m and rad].
-
-    The angle of the missing rotation is taken from the chord between the two rotations, which is exact also
-    where the angle is small and costs less than its axis.
-    """
-    tip = IDENTITY
-    for screw, theta in zip(chain.screws, unstack(q), strict=True):
-        tip = tip @ displacement(screw, theta)
-    tip, wanted = tip @ chain.tip, pose_from_array(target)
-    columns = zip((tip.R.x, tip.R.y, tip.R.z), (wanted.R.x, wanted.R.y, wanted.R.z), strict=True)
-    chord = sqrt(sum(dot(a - b, a - b) for a, b in columns) / 8)
-    turn, gap = 2 * np.arcsin(np.minimum(chord, 1.0)), tip.p - wanted.p
-    return np.asarray(np.sqrt(turn * turn + dot(gap, gap)))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from screwkin.algebra.se3 import ZERO, Twist, Vector
 from screwkin.compiler.records import Tape, identifier, pose_input
-from screwkin.kinematics.formula import Formula
+from screwkin.kinematics.tape import Formula
 from screwkin.mechanism.mechanism import Mechanism, coupling_graph, virtual_chains
 from screwkin.mechanism.network import coupling_twists
 from screwkin.mechanism.virtual_motion import imposing_chains, primary_motion

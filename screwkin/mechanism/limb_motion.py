@@ -13,7 +13,7 @@ from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.screws import AT_REST, Displacement, Screw, advance, carry
 from screwkin.algebra.se3 import Pose, Rotation, Twist, Vector, bracket, cross
 from screwkin.kinematics.positions import frame_pose
-from screwkin.kinematics.serial_chain import Chain
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.limb_rates import Split, point_rates, pose_rates, split_of
 from screwkin.model.robot import Limb, Robot
 
@@ -53,7 +53,7 @@ class LimbMotion:
             q: joint positions.
             joints: number of the limb's joints before the link in whose axes screws are told.
         """
-        chain = Chain.of(robot, limb.name)
+        chain = SerialChain.of(robot, limb.name)
         split, path = split_of(chain), chain.joints
         carried = dict(zip(robot.link_names, D, strict=True))
         links = [robot.joints[path[0]].parent, *(robot.joints[i].child for i in path)]
@@ -108,7 +108,7 @@ class LimbMotion:
         return self._solved(wanted - known)[0]
 
 
-def told_at(chain: Chain, split: Split | None) -> tuple[int, Vector]:
+def told_at(chain: SerialChain, split: Split | None) -> tuple[int, Vector]:
     """Where a limb's screws are told: after how many joints the link that bears the point, and the point.
 
     The split's point, else the first axis of six joints, and the tip of three; zero pose.
@@ -118,7 +118,9 @@ def told_at(chain: Chain, split: Split | None) -> tuple[int, Vector]:
     return (split.first, split.point) if split else (0, chain.screws[0].s0)
 
 
-def seen_screws(chain: Chain, split: Split | None, q: Sequence[Scalar], joints: int) -> tuple[Twist, ...]:
+def seen_screws(
+    chain: SerialChain, split: Split | None, q: Sequence[Scalar], joints: int
+) -> tuple[Twist, ...]:
     """A limb's screws at ``told_at``, in the axes of the link after that many joints."""
     seen = seen_from(chain.screws, q, joints)
     link, fixed = told_at(chain, split)

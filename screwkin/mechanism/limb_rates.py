@@ -21,7 +21,7 @@ from screwkin.algebra.linear import cramer, orthogonal
 from screwkin.algebra.scalar import Scalar, minus, times
 from screwkin.algebra.se3 import Twist, Vector, dot, leaves
 from screwkin.kinematics.axis_geometry import meeting, parallel
-from screwkin.kinematics.serial_chain import Chain
+from screwkin.kinematics.serial_chain import SerialChain
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Split:
         return range(self.first, self.first + 3)
 
 
-def split_of(chain: Chain) -> Split | None:
+def split_of(chain: SerialChain) -> Split | None:
     """The split of a six-joint limb; None if no three neighbouring axes meet or are parallel."""
     if len(chain.screws) != 6 or not chain.turning.all():
         return None
@@ -101,7 +101,7 @@ def point_rates(twists: Sequence[Twist], wanted: Vector, length: float) -> tuple
     return cramer([t.v / length for t in twists], wanted / length)
 
 
-def doubtful(chain: Chain, tolerance: float) -> float:
+def doubtful(chain: SerialChain, tolerance: float) -> float:
     """Determinant below which a limb's least singular value may lie below the tolerance.
 
     The product of the other five singular values is at most that of a matrix with its Frobenius norm shared

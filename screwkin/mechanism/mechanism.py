@@ -64,6 +64,11 @@ class Mechanism:
         return tuple(name for name, _, _ in self.graph.edges)
 
     @property
+    def choice(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """What distinguishes it from other mechanisms of its robot: the primary and secondary couplings."""
+        return self.primary, self.secondary
+
+    @property
     def links(self) -> tuple[str, ...]:
         """Names of the links, virtual ones included."""
         return self.graph.vertices

@@ -2,89 +2,109 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any, Literal
 
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.algebra.scalar import is_jax
+from screwkin.algebra.scalar import Scalar, is_jax
+from screwkin.algebra.se3 import ZERO, Pose, Twist, Vector, leaves
 from screwkin.errors import InputError
-from screwkin.kinematics.arrays import Told, checked, one_batch, told
+from screwkin.kinematics.arrays import Argument, checked_inputs
+from screwkin.kinematics.formula import formula
+from screwkin.kinematics.kinds import Columns, Joints, TipTwists
 from screwkin.kinematics.status import Status
-from screwkin.mechanism import davies, network, rates
-from screwkin.mechanism import virtual_motion as virtual
-from screwkin.mechanism.mechanism import Mechanism
+from screwkin.mechanism import rates
+from screwkin.mechanism.mechanism import WAIST, Mechanism
+from screwkin.mechanism.network import coupling_twists, network_blocks
 from screwkin.mechanism.secondary import secondary_rates as kernel_rates
 from screwkin.mechanism.singularity import refuse_singular
+from screwkin.mechanism.virtual_motion import imposing_chains, primary_motion
 from screwkin.model.state import State
 
 
-def network_matrix(mechanism: Mechanism, state: State, point: Any = None) -> Array:
-    """Davies' network matrix N (..., 6 circuits, couplings): N q' = 0, rows [omega; v] of every circuit.
+@formula
+def network_matrix(
+    mechanism: Mechanism, T_world_base: Pose, q: Joints, point: Vector | None = None
+) -> Columns:
+    """Davies' network matrix N of the closed mechanism: N q' = 0 for the rates of all couplings.
 
     Args:
         mechanism: from ``closed_mechanism``; its ``couplings`` name the columns.
-        state: a (closed) state.
-        point: world point (..., 3) [m] where the screws are told; default: the waist origin, which travels
-            with the robot. A far point spoils the conditioning.
+        state: closed, where the mechanism has loops of its own.
+        point: world point [m] at which the screws are expressed; default: the base origin, which travels with
+            the robot. A far point spoils the conditioning.
+
+    Returns:
+        N (..., 6 circuits, couplings), world axes, rows [omega; v at the point] of every circuit.
+
+    Raises:
+        ShapeError: a wrong shape, NaN or infinity, or a base pose that is not rigid.
+
+    Example:
+        >>> import screwkin as sk
+        >>> robot = sk.load_robot(sk.robot_names()[1])
+        >>> sk.network_matrix(sk.closed_mechanism(robot), sk.home(robot)).shape
+        (24, 54)
 
     Source: paper A, eq. 8-9.
     """
-    at = {} if point is None else {"point": ("point", point, 3)}
-    choice = mechanism.robot, mechanism.primary, mechanism.secondary
-    found = davies.coupling_screws(*choice, point is None, told=told(mechanism.robot, state, at))
-    return network.assembled(mechanism, found["S"])
+    at = ZERO if point is None else point - T_world_base.p
+    blocks = network_blocks(mechanism, coupling_twists(mechanism, T_world_base.R, q, at))
+    columns = range(len(mechanism.couplings))
+    return [[x for circuit in blocks for x in leaves(circuit[c])] for c in columns]
 
 
+@formula
 def virtual_motion(
-    mechanism: Mechanism, state: State, base_twist: Any, tip_twists: Mapping[str, Any]
-) -> Array:
-    """Rates (..., primary) of the primary virtual couplings that give base and tips their twists.
+    mechanism: Mechanism, T_world_base: Pose, q: Joints, base_twist: Twist | None, tip_twists: TipTwists
+) -> list[Scalar]:
+    """Rates of the primary virtual couplings that give base and tips their twists.
 
     Args:
         mechanism: its primary couplings must all belong to virtual chains.
         state: the present state.
-        base_twist: [omega; v of the base origin] (..., 6), world axes; ignored with a fixed base.
-        tip_twists: for every tip with primary couplings: [omega; v of the tip origin] (..., 6), or v alone
-            (..., 3) where only translations are primary.
+        base_twist: [omega; v of the base origin], world axes; without effect on a fixed base.
+        tip_twists: for every tip with primary couplings [omega; v of the tip's origin], or v alone (..., 3)
+            where only translations are primary.
+
+    Returns:
+        (..., primary) in ``mechanism.primary`` order [rad/s, m/s].
 
     Raises:
-        InputError: a real joint is primary, or a tip's twist is missing or lacks a rotation.
+        InputError: a real joint is primary, or a tip's twist is missing or has no rotation.
+        ShapeError: a wrong shape, NaN or infinity, or a base pose that is not rigid.
+
+    Example:
+        >>> import numpy as np
+        >>> import screwkin as sk
+        >>> robot = sk.load_robot(sk.robot_names()[0])
+        >>> rest = {tip: np.zeros(6) for tip in robot.tip_names}
+        >>> rates = sk.virtual_motion(sk.closed_mechanism(robot), sk.home(robot), [0, 0, 0, 0.1, 0, 0], rest)
+        >>> float(abs(rates).sum())                 # the waist slides along x at 0.1 m/s, the tips rest
+        0.1
 
     Source: paper A, eq. 7.
     """
-    moving, whole = dict[str, Told](), []
-    chains = virtual.imposing_chains(mechanism)
-    for k, chain in enumerate(chains):
+    given = {} if base_twist is None else {WAIST: base_twist}
+    given |= tip_twists
+    chains = imposing_chains(mechanism)
+    for chain in chains:
         wanted = [name for name in chain.names if name in mechanism.primary]
-        given = base_twist if chain.limb is None else tip_twists.get(chain.name)
-        named = "base_twist" if chain.limb is None else f"tip_twists[{chain.name!r}]"
-        if given is None:
+        if chain.name not in given:
             lacks = "base_twist is None" if chain.limb is None else f"tip_twists lacks {chain.name}"
             raise InputError(f"{lacks}, but {', '.join(wanted)} are primary")
-        size = 3 if _length(given) == 3 else 6
-        if size == 6:
-            whole.append(chain.name)
-        elif any(name.split(".")[1][0] == "r" for name in wanted):
+        turning = any(name.split(".")[1][0] == "r" for name in wanted)
+        if given[chain.name].omega is ZERO and turning:
             raise InputError(f"the twist of {chain.name} has 3 components, but its rotations are primary")
-        moving[f"twist_{k}"] = (named, given, size)
     virtually = {name for chain in chains for name in chain.names}
     real = [name for name in mechanism.primary if name not in virtually]
     if real:
         raise InputError(
             f"primary couplings {', '.join(real)} belong to no virtual chain; give their rates directly"
         )
-    choice = mechanism.robot, mechanism.primary, mechanism.secondary
-    return davies.primary_rates(*choice, tuple(whole), told=told(mechanism.robot, state, moving))["primary"]
-
-
-def _length(value: Any) -> int:
-    """Of the last axis; 0 for what is no array."""
-    try:
-        return int(np.shape(value)[-1])
-    except (ValueError, IndexError):
-        return 0
+    motion = primary_motion(mechanism, T_world_base, q, given)
+    return [motion[name] for name in mechanism.primary]
 
 
 def secondary_rates(
@@ -104,10 +124,15 @@ def secondary_rates(
 
     Source: paper A, eq. 10-11.
     """
-    primary = checked("primary_rates", primary_rates, len(mechanism.primary))
     if on_singular not in ("raise", "status"):
         raise InputError(f"on_singular is {on_singular!r}; valid: raise, status")
-    fast = _by_program(mechanism, state, primary)
+    arguments = [
+        Argument("T_world_base", "state.T_world_base", (4, 4), rigid=True),
+        Argument("q", "state.q", (len(mechanism.robot.joints),)),
+        Argument("primary", "primary_rates", (len(mechanism.primary),)),
+    ]
+    arrays, batch = checked_inputs(arguments, [state.T_world_base, state.q, primary_rates])
+    fast = None if any(map(is_jax, arrays)) else _by_program(mechanism, arrays, batch)
     if fast is not None:
         values, singular = fast
         if on_singular == "status":
@@ -115,24 +140,20 @@ def secondary_rates(
         if not singular.any():
             return values
     N = network_matrix(mechanism, state)
-    solution = rates.secondary_rates(mechanism, N, primary)
-    singular = solution.singular
+    solution = rates.secondary_rates(mechanism, N, arrays[2])
     if on_singular == "status":
-        return solution.values, _status(singular.any(axis=-1), solution.values.shape[:-1])
+        return solution.values, _status(solution.singular.any(axis=-1), solution.values.shape[:-1])
     refuse_singular(mechanism, N, solution)
     return solution.values
 
 
-def _by_program(mechanism: Mechanism, state: State, primary: Array) -> tuple[Array, Array] | None:
-    """Secondary rates by the kernel, and which samples are singular; None where no program pays."""
-    arrays = told(mechanism.robot, state)
-    T, q = arrays["T_world_base"], arrays["q"]
-    if any(map(is_jax, (T, q, primary))):
-        return None
-    batch = one_batch({"state.T_world_base": (T, 2), "state.q": (q, 1), "primary_rates": (primary, 1)})
+def _by_program(
+    mechanism: Mechanism, arrays: list[Array], batch: tuple[int, ...]
+) -> tuple[Array, Array] | None:
+    """Secondary rates by the program, and which samples are singular; None where blocks are too large."""
     flat = [
-        np.broadcast_to(a, (*batch, *inner)).reshape(-1, *inner)
-        for a, inner in ((T, T.shape[-2:]), (q, q.shape[-1:]), (primary, primary.shape[-1:]))
+        np.broadcast_to(a, (*batch, *a.shape[a.ndim - inner :])).reshape(-1, *a.shape[a.ndim - inner :])
+        for a, inner in zip(arrays, (2, 1, 1), strict=True)
     ]
     found = kernel_rates(mechanism, *flat)
     if found is None:

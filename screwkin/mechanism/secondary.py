@@ -29,7 +29,7 @@ from screwkin.compiler.program import Program, Recorder, kept
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.compiler.run import run
 from screwkin.kinematics.positions import link_displacements
-from screwkin.kinematics.serial_chain import Chain
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism import rates
 from screwkin.mechanism.choice import RANK_TOLERANCE, characteristic_length
 from screwkin.mechanism.davies import mechanism_of
@@ -146,7 +146,7 @@ def _split(
     for limb in robot.limbs:
         path = robot.path_to(limb.link)
         if [robot.joint_names[i] for i in path] == list(names):
-            split = split_of(Chain.of(robot, limb.name))
+            split = split_of(SerialChain.of(robot, limb.name))
             if split is not None:
                 return split, carried[robot.joints[path[split.first]].parent] @ split.point
         turning = {f"{limb.tip}.{axis}" for axis in ("rx", "ry", "rz")}

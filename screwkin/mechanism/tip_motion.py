@@ -10,7 +10,7 @@ from screwkin.algebra.se3 import ZERO, Pose, Twist, Vector
 from screwkin.compiler.program import Recorder, kept
 from screwkin.compiler.records import Tape, identifier, matrix, pose_input, twist_input
 from screwkin.kinematics import positions
-from screwkin.kinematics.formula import Formula
+from screwkin.kinematics.tape import Formula
 from screwkin.mechanism.limb_motion import LimbMotion
 from screwkin.model.robot import Robot
 

@@ -11,7 +11,16 @@ ROBOTS, GAITS, PAPERS = "robots", "trajectories", "papers"
 
 
 def robot_names() -> tuple[str, ...]:
-    """Names of the bundled robots and mechanisms, such as ``linkages/four-bar``."""
+    """Names of the bundled robots and mechanisms, in order of the alphabet.
+
+    Returns:
+        Names that ``load_robot`` takes, such as ``linkages/four-bar``.
+
+    Example:
+        >>> import screwkin as sk
+        >>> "linkages/four-bar" in sk.robot_names()
+        True
+    """
     return _names(ROBOTS)
 
 

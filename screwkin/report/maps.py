@@ -9,7 +9,8 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.analysis.stiffness_maps import DeflectionMap
-from screwkin.analysis.workspace import OUT_OF_REACH, REACHABLE, WorkspaceMap
+from screwkin.analysis.workspace import WorkspaceMap
+from screwkin.ik.reach import OUT_OF_REACH, REACHABLE
 from screwkin.model.robot import Robot
 from screwkin.report.style import DPI, WIDTH, Axes, Figure, shown
 

@@ -13,8 +13,9 @@ from screwkin.analysis.foot_path import FootPath, foot_from_waist
 from screwkin.analysis.ik_study import IkRow, fitting_entries, ik_study, measured
 from screwkin.analysis.ik_targets import random_targets, walking_path, walking_targets
 from screwkin.errors import InputError, UnknownNameError, UnreachableError
-from screwkin.ik.numeric import IkSettings, solve_limb
-from screwkin.kinematics.serial_chain import Chain
+from screwkin.ik.limb import solve_limb
+from screwkin.ik.numeric import IkSettings
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.model.table import load_robot
 from tests.ik.legs import apart
 
@@ -22,12 +23,12 @@ PATH = FootPath(lateral=0.048, height=0.43, stride=0.06, lift=0.03)
 
 
 @pytest.fixture(scope="module")
-def leg() -> Chain:
-    return Chain.of(load_robot("poppy12"), "left_leg")
+def leg() -> SerialChain:
+    return SerialChain.of(load_robot("poppy12"), "left_leg")
 
 
 @pytest.fixture(scope="module")
-def rows(leg: Chain) -> dict[str, IkRow]:
+def rows(leg: SerialChain) -> dict[str, IkRow]:
     """The rows of the walk that the paper's table has, and those that its speed-up is told by."""
     target = walking_targets(leg, walking_path(leg))
     wanted = ("closed", "hybrid-newton", "hybrid-lm", "hybrid-dls", "dls-0.01", "dls-0.055", "pinv")
@@ -57,13 +58,13 @@ def test_the_hybrid_needs_a_twentieth_of_the_iterations_of_damped_least_squares(
     assert 95 < rows["dls-0.055"].mean_iterations < 115
 
 
-def test_the_walk_is_the_papers_in_size_and_number(leg: Chain) -> None:
+def test_the_walk_is_the_papers_in_size_and_number(leg: SerialChain) -> None:
     path = walking_path(leg)
     assert (path.height, path.stride, path.lateral) == pytest.approx((0.43, 0.06, 0.048))
     assert walking_targets(leg, path).shape == (750, 4, 4)
 
 
-def test_the_joints_move_smoothly_along_the_walk(leg: Chain) -> None:
+def test_the_joints_move_smoothly_along_the_walk(leg: SerialChain) -> None:
     target = walking_targets(leg, walking_path(leg))
     found = solve_limb(leg, target, "closed", np.zeros((750, 6)), IkSettings(), (750,))
     assert apart(found.path()[1:], found.path()[:-1]).max() < 0.06
@@ -108,7 +109,7 @@ def test_the_waist_walks_as_far_as_the_feet() -> None:
 def test_a_study_tells_every_method_that_fits_on_both_sets_and_its_settings() -> None:
     shares: list[float] = []
     study = ik_study(load_robot("poppy12"), "right_leg", poses=20, cap=30, progress=shares.append)
-    ours = [entry.name for entry in fitting_entries(Chain.of(load_robot("poppy12"), "right_leg"), 500)]
+    ours = [entry.name for entry in fitting_entries(SerialChain.of(load_robot("poppy12"), "right_leg"), 500)]
     for data, samples in (("gait", 750), ("random", 20)):
         rows = [row for row in study.rows if row.data == data]
         assert [row.method for row in rows][: len(ours)] == ours
@@ -129,13 +130,13 @@ def test_a_limb_without_closed_form_gets_the_numeric_rows_and_no_walk() -> None:
 
 
 def test_a_smaller_robot_walks_with_its_waist_as_high_as_it_can() -> None:
-    chain = Chain.of(load_robot("bioloid"), "left_leg")
+    chain = SerialChain.of(load_robot("bioloid"), "left_leg")
     path = walking_path(chain)
     assert 0.94 < path.height / 0.1862548 < 0.984
     assert path.stride / path.height == pytest.approx(0.06 / 0.43)
 
 
-def test_random_targets_are_the_same_for_a_seed_and_lie_within_reach(leg: Chain) -> None:
+def test_random_targets_are_the_same_for_a_seed_and_lie_within_reach(leg: SerialChain) -> None:
     np.testing.assert_array_equal(random_targets(leg, 5, 3), random_targets(leg, 5, 3))
     assert np.abs(random_targets(leg, 5, 3) - random_targets(leg, 5, 4)).max() > 0.01
     assert (np.linalg.norm(random_targets(leg, 100, 3)[:, :3, 3], axis=1) < 0.5).all()
@@ -154,14 +155,14 @@ def test_what_cannot_be_studied_is_refused() -> None:
     assert caught.value.limb == "left_leg"
 
 
-def test_libraries_that_are_absent_give_no_rows(monkeypatch: pytest.MonkeyPatch, leg: Chain) -> None:
+def test_libraries_that_are_absent_give_no_rows(monkeypatch: pytest.MonkeyPatch, leg: SerialChain) -> None:
     assert ik_others._library("no_such_library") is None
     monkeypatch.setattr(ik_others, "_library", lambda name: None)
     for _, _, solve in ik_others.OTHERS:
         assert solve(leg, random_targets(leg, 1, 0), IkSettings()) is None
 
 
-def test_offsets_and_axes_make_the_limb_by_the_product_of_its_rotations(leg: Chain) -> None:
+def test_offsets_and_axes_make_the_limb_by_the_product_of_its_rotations(leg: SerialChain) -> None:
     """The convention of EAIK: p = P0 + R1 (P1 + R2 (P2 + …)), R = R1 R2 … Rn."""
     axes, offsets = ik_others.offset_parameters(leg)
     q = np.array([0.1, -0.2, -0.5, 0.9, -0.3, 0.2])
@@ -176,7 +177,7 @@ def test_offsets_and_axes_make_the_limb_by_the_product_of_its_rotations(leg: Cha
 
 
 def test_of_eaiks_answers_least_squares_ones_and_wrong_ones_do_not_count(
-    monkeypatch: pytest.MonkeyPatch, leg: Chain
+    monkeypatch: pytest.MonkeyPatch, leg: SerialChain
 ) -> None:
     """A stand-in with EAIK's interface: right for the first pose, wrong for the next, none for the last."""
     q = np.array([0.1, -0.2, -0.5, 0.9, -0.3, 0.2])

@@ -117,7 +117,7 @@ def test_arrays_hold_the_maps_on_one_grid(maps):
 
 
 def test_wrong_input_is_told(robot, places):
-    with pytest.raises(InputError, match="cannot bear the robot and be moved"):
+    with pytest.raises(InputError, match="cannot support the robot and be moved"):
         stiffness_maps(robot, places, support="left_foot")
     with pytest.raises(UnknownNameError, match="third_foot"):
         stiffness_maps(robot, places, support="third_foot")

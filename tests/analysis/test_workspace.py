@@ -207,6 +207,12 @@ def test_grids_that_make_no_sense_are_refused(robot, heights, resolution, messag
         workspace(robot, "left_leg", heights, resolution)
 
 
+def test_robots_with_loops_are_refused_by_what_knows_trees_only(robot):
+    closed = replace(robot, closures=sk.load_robot("linkages/four-bar").closures)
+    with pytest.raises(InputError, match=r"has closures .* no function maps those of closed loops yet"):
+        workspace(closed, "left_leg", [0.35], 0.01)
+
+
 def test_limbs_that_cannot_hold_an_orientation_are_refused(robot):
     with pytest.raises(InputError, match="left_arm has 3 joints; six are needed"):
         workspace(sk.load_robot("bioloid"), "left_arm")

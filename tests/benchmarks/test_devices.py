@@ -13,7 +13,7 @@ import pytest
 
 import screwkin as sk
 from benchmarks import devices
-from screwkin.dynamics import body
+from screwkin.kinematics import body
 
 ROOT = Path(__file__).parents[2]
 
@@ -23,7 +23,7 @@ from dataclasses import asdict
 import jax, numpy as np
 import screwkin as sk
 from benchmarks.devices import measured
-from screwkin.dynamics import body
+from screwkin.kinematics import body
 q = np.random.default_rng(0).uniform(-2, 2, (64, 12))
 given = {"T_world_base": np.tile(np.eye(4), (64, 1, 1)), "q": q}
 program = body.tip_poses.program(sk.load_robot("poppy12"))
@@ -47,7 +47,7 @@ def test_batches_are_shared_among_devices() -> None:
     assert all(row["alone"][1] <= row["alone"][0] for row in rows)
     found = {"device": "cpu", "count": 4, "jax": "1", "host": {"processor": "x", "cores": 4}, "rows": rows}
     table = devices.markdown(found)
-    assert table.count("| `poppy12_tips` |") == 2
+    assert table.count("| `poppy12_tip_poses` |") == 2
 
 
 def test_wrong_results_are_not_timed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -66,7 +66,7 @@ def test_wrong_results_are_not_timed(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_every_kernel_gets_inputs_that_it_can_answer() -> None:
     robot = sk.load_robot("bioloid")
     told = {program.name: (program, given) for program, given in devices.inputs(robot, 40)}
-    assert set(told) == {f"bioloid_{name}" for name in ("rates", "zmp", "right_leg_nearest", "pose")}
+    assert set(told) == {f"bioloid_{name}" for name in ("rates", "balance", "right_leg_nearest", "pose")}
     for program, given in told.values():
         assert {group.name for group in program.inputs} == set(given)
         for name, x in devices.run(program, given, path="numpy").items():

@@ -14,9 +14,10 @@ from screwkin.compiler.graph import FUNCTIONS
 from screwkin.compiler.program import Recorder
 from screwkin.compiler.run import chosen_path, python_function, run
 from screwkin.compiler.series import TURNS
-from screwkin.dynamics import body
 from screwkin.dynamics.newton_euler import GRAVITY
+from screwkin.dynamics.quantities import balance
 from screwkin.ik import programs as limbs
+from screwkin.kinematics import body
 from screwkin.mechanism.tip_motion import follows, motion
 from tests.kinematics.machines import random_state, random_tree
 
@@ -90,7 +91,7 @@ def test_accelerations_are_the_slopes_of_the_rates(name):
 def test_centre_of_mass_momentum_and_zmp_are_those_of_the_formulas(path):
     robot = sk.load_robot("poppy12")
     state, rng = moving(robot)
-    program = body.balance.program(robot)
+    program = balance.program(robot)
     inputs = {g.name: rng.uniform(-1, 1, (len(state.q), *g.shape)) for g in program.inputs}
     inputs |= {"T_world_base": state.T_world_base, "q": state.q}
     found = run(program, inputs, path=path)
@@ -114,13 +115,12 @@ def test_centre_of_mass_momentum_and_zmp_are_those_of_the_formulas(path):
 def test_random_trees_of_turning_sliding_and_helical_joints(seed, path):
     robot = random_tree(seed)
     state = random_state(robot, seed, (20,))
-    for program, expected in (
-        (body.link_poses.program(robot), body.link_poses.values(robot, told=vars(state))),
-        (body.center_of_mass.program(robot), body.center_of_mass.values(robot, told=vars(state))),
-    ):
-        found = run(program, vars(state), path=path)
-        for name, values in expected.items():
-            np.testing.assert_allclose(found[name], values, atol=1e-13)
+    for quantity in (body.link_poses, body.center_of_mass):
+        found = run(quantity.program(robot), vars(state), path=path)[quantity.__name__]
+        expected = quantity.definition.by_formula(
+            robot, ("T_world_base", "q"), (), list(vars(state).values())
+        )
+        np.testing.assert_allclose(found, expected, atol=1e-13)
 
 
 @pytest.mark.parametrize("name", ROBOTS)
@@ -129,7 +129,7 @@ def test_compact_jacobians_are_columns_of_the_public_one(name):
     q = moving(robot)[0].q
     state = sk.State(np.eye(4), q)
     for limb in robot.limbs:
-        found = run(body.limb_jacobian.program(robot, limb.name), {"q": q}, path="numpy")["J"]
+        found = run(body.limb_jacobian.program(robot, limb.name), {"q": q}, path="numpy")["limb_jacobian"]
         columns = [6 + i for i in robot.path_to(limb.link)]
         np.testing.assert_allclose(found, sk.jacobian(robot, state, limb.tip)[..., columns], atol=1e-14)
 
@@ -156,10 +156,10 @@ def test_inputs_broadcast_and_an_empty_batch_is_no_fault():
     robot = sk.load_robot("poppy12")
     q = np.zeros((3, 1, 12))
     T = np.broadcast_to(np.eye(4), (5, 4, 4))
-    found = run(body.tip_poses.program(robot), {"T_world_base": T, "q": q})["T_world_tip"]
+    found = run(body.tip_poses.program(robot), {"T_world_base": T, "q": q})["tip_poses"]
     assert found.shape == (3, 5, 2, 4, 4)
     none = run(body.tip_poses.program(robot), {"T_world_base": np.eye(4), "q": np.zeros((0, 12))})
-    assert none["T_world_tip"].shape == (0, 2, 4, 4)
+    assert none["tip_poses"].shape == (0, 2, 4, 4)
 
 
 def test_generated_python_is_a_module_that_stands_alone():

@@ -10,7 +10,7 @@ import pytest
 import screwkin as sk
 from screwkin.compiler import emit_jax, native, xla_call
 from screwkin.compiler.run import run
-from screwkin.dynamics import body
+from screwkin.kinematics import body
 
 pytestmark = pytest.mark.usefixtures("x64")
 
@@ -40,7 +40,7 @@ def test_batches_of_any_size_give_the_numbers_of_numpy(program, count):
     assert calls(f, T, q)
     (found,) = jax.jit(f)(T, q)
     told = {"T_world_base": np.asarray(T), "q": np.asarray(q)}
-    np.testing.assert_allclose(found, run(program, told, path="numpy")["com"], atol=1e-14)
+    np.testing.assert_allclose(found, run(program, told, path="numpy")["center_of_mass"], atol=1e-14)
 
 
 @compiled

@@ -300,5 +300,8 @@ def test_other_wrong_input_is_told(robot):
     with pytest.raises(UnknownNameError, match="left_knee"):
         static_deflection(robot, home, "right_foot").of("left_knee")
     linkage = sk.load_robot("linkages/four-bar")
-    with pytest.raises(InputError, match="closures"):
-        static_deflection(linkage, sk.State(np.eye(4), np.zeros(len(linkage.joints))), "base", 60.0)
+    state = sk.State(np.eye(4), np.zeros(len(linkage.joints)))
+    with pytest.raises(InputError, match=r"closures .* no function computes those of closed loops yet"):
+        static_deflection(linkage, state, "base", 60.0)
+    with pytest.raises(InputError, match=r"closures .* no function computes those of closed loops yet"):
+        cartesian_compliance(linkage, state, "base", linkage.link_names[-1], 60.0)

@@ -8,9 +8,16 @@ import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from screwkin.dynamics.support import convex_hull, signed_margin, spikes, support_margin
+from screwkin.dynamics.margin import support_margin
+from screwkin.dynamics.support import convex_hull, spikes
 
 SOLE = np.array([[0.052, -0.033], [0.052, 0.033], [-0.052, 0.033], [-0.052, -0.033]])
+
+
+def signed_margin(points, corners):
+    """Margin of points (T, 2) in one polygon."""
+    soles = np.broadcast_to(corners, (len(points), 1, *corners.shape))
+    return support_margin(points, soles, np.ones((len(points), 1), dtype=bool))
 
 
 def shapely_margin(polygon, point):
@@ -60,7 +67,7 @@ def test_the_support_follows_the_contacts():
         assert margin[k] == pytest.approx(shapely_margin(polygon, zmp[k]), abs=1e-15), f"sample {k}"
 
 
-def test_where_no_sole_bears_there_is_no_support():
+def test_where_no_sole_is_in_contact_there_is_no_support():
     soles, contact = walk()
     contact[5] = False
     margin = support_margin(np.zeros((12, 2)), soles, contact)
@@ -68,7 +75,7 @@ def test_where_no_sole_bears_there_is_no_support():
     assert np.isfinite(np.delete(margin, 5)).all()
 
 
-def test_a_sole_that_moves_while_it_bears_is_followed_too():
+def test_a_sole_that_moves_in_contact_is_followed_too():
     soles, contact = walk()
     contact[:] = True
     margin = support_margin(np.tile([0.14, -0.042], (12, 1)), soles, contact)

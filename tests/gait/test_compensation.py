@@ -14,7 +14,7 @@ import screwkin as sk
 from screwkin.compliance.stiffness import static_deflection
 from screwkin.errors import InputError, LimitError, NoSolutionError, UnknownNameError
 from screwkin.gait.compensation import compensate, convergence
-from screwkin.gait.loads import load_shares
+from screwkin.gait.loads import load_distribution
 from screwkin.trajectory import load_trajectory
 
 K = 60.0
@@ -149,7 +149,7 @@ def test_a_hundred_times_stiffer_needs_a_hundredth(robot: sk.Robot, walked: sk.T
 
 
 def test_the_load_goes_from_foot_to_foot_without_a_jump(walked: sk.Trajectory) -> None:
-    shares = load_shares(walked)
+    shares = load_distribution(walked)
     np.testing.assert_allclose(shares.sum(axis=1), 1.0)
     for foot, _, rows in stances(walked):
         assert (shares[rows, walked.feet.index(foot)] == 1.0).all()
@@ -209,7 +209,7 @@ def test_trajectories_that_do_not_fit_are_refused(robot: sk.Robot, walked: sk.Tr
         compensate(sk.load_robot("bioloid"), walked, K)
     flying = walked.contact.copy()
     flying[60] = False
-    with pytest.raises(InputError, match=r"t = 1\.200 s: no foot bears"):
+    with pytest.raises(InputError, match=r"t = 1\.200 s: no foot is in contact"):
         compensate(robot, replace(walked, contact=flying), K)
     with pytest.raises(UnknownNameError, match="elbow"):
         compensate(robot, walked, {"elbow": 3.0, "default": K})

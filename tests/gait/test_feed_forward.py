@@ -11,7 +11,7 @@ import screwkin as sk
 from screwkin.compliance.stiffness import static_deflection
 from screwkin.gait.compensation import compensate
 from screwkin.gait.feed_forward import walking_torques
-from screwkin.gait.loads import load_shares
+from screwkin.gait.loads import load_distribution
 
 
 @pytest.fixture(scope="module")
@@ -57,7 +57,7 @@ def test_standing_on_both_feet_neither_ankle_works_against_the_other(
     torque = walking_torques(robot, walked)
     rolls = [robot.joint_names.index(f"{side}_ankle_roll") for side in ("left", "right")]
     standing = walked.time < 0.5
-    assert np.abs(load_shares(walked)[standing] - 0.5).max() < 0.05
+    assert np.abs(load_distribution(walked)[standing] - 0.5).max() < 0.05
     assert np.abs(torque[standing][:, rolls]).max() < 0.01 * robot.mass * 9.81 * 0.048
     assert np.abs(np.diff(torque, axis=0)).max() < 0.35 * np.abs(torque).max()
 

@@ -7,7 +7,7 @@ import tomllib
 import numpy as np
 import pytest
 
-from screwkin.dynamics.support import support_margin
+from screwkin.dynamics.margin import support_margin
 from screwkin.errors import GaitError, InputError, NoSolutionError, UnknownNameError
 from screwkin.gait.balance import soles_on_floor, zmp
 from screwkin.gait.balance_problem import balance_problem, support_edges

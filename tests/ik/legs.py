@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from screwkin.algebra.screws import Screw
 from screwkin.algebra.se3 import Vector, pose_from_array
-from screwkin.kinematics.serial_chain import Chain
+from screwkin.kinematics.serial_chain import SerialChain
 
 Floats = NDArray[np.float64]
 
@@ -32,13 +32,13 @@ class Leg:
             T[:, :3, :3] = R @ T[:, :3, :3]
         return T
 
-    def chain(self, limit: float = np.pi) -> Chain:
+    def chain(self, limit: float = np.pi) -> SerialChain:
         """The leg as the package sees it, numbers of the table not made structure."""
         screws = [Screw(_vector(s), _vector(p)) for s, p in zip(self.axes, self.points, strict=True)]
         names = tuple(f"joint{i + 1}" for i in range(len(screws)))
         length = float(np.linalg.norm(self.tip[:3, 3] - self.points, axis=1).max())
         ends = np.full(len(screws), limit)
-        return Chain(
+        return SerialChain(
             "leg",
             names,
             tuple(range(len(screws))),

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from screwkin.errors import InputError
-from screwkin.ik.numeric import IkSettings, solve_limb
+from screwkin.ik.limb import solve_limb
+from screwkin.ik.numeric import IkSettings
 from screwkin.ik.solutions import BEYOND, LimbSolutions, ordered
-from screwkin.kinematics.serial_chain import Chain
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.kinematics.status import Status
 from screwkin.model.table import load_robot
 from tests.ik.legs import Floats, Leg, apart, offset_leg, spherical_leg
@@ -84,7 +85,7 @@ def test_a_path_passes_the_least_squares_answers_where_there_is_no_solution() ->
 
 
 def test_branches_inside_the_limits_come_first_then_the_nearest_to_the_guess() -> None:
-    chain = Chain.of(load_robot("poppy12"), "left_leg")
+    chain = SerialChain.of(load_robot("poppy12"), "left_leg")
     rng = np.random.default_rng(4)
     q = rng.uniform(-3, 3, (50, 8, 6))
     q[:, 5] = rng.uniform(chain.lower, chain.upper, (50, 6))

@@ -9,9 +9,10 @@ import pytest
 
 from screwkin.errors import InputError
 from screwkin.ik.hybrid import hybrid_seed, spherical_variant
-from screwkin.ik.numeric import IkSettings, Method, solve_limb
+from screwkin.ik.limb import Method, solve_limb
+from screwkin.ik.numeric import IkSettings
 from screwkin.kinematics.axis_geometry import meeting
-from screwkin.kinematics.serial_chain import Chain, missing
+from screwkin.kinematics.serial_chain import SerialChain, residual
 from screwkin.model.table import load_robot
 from tests.ik.legs import Floats, apart, backwards, miss, offset_leg, random_spherical_leg, spherical_leg
 
@@ -38,14 +39,14 @@ def lack(q: Floats, target: Floats) -> Floats:
 
 def test_error_and_jacobian_agree_with_differences_of_another_forward_kinematics() -> None:
     q, target = bent(1, 20), LEG.reach(bent(2, 20))
-    error, J = missing(CHAIN, q, target)
+    error, J = residual(CHAIN, q, target)
     np.testing.assert_allclose(error, lack(q, target), atol=1e-12)
     h = 1e-6
     for i in range(6):
         moved = LEG.reach(q + h * np.eye(6)[i])
         # Seen from the target at q itself, what lacks is small and its rotation vector is the turn.
         np.testing.assert_allclose(J[:, :, i], lack(q, moved) / h, atol=2e-6)
-    places, positions = missing(CHAIN, q, target[:, :3, 3])
+    places, positions = residual(CHAIN, q, target[:, :3, 3])
     np.testing.assert_array_equal(places, error[:, 3:])
     np.testing.assert_array_equal(positions, J[:, 3:])
 
@@ -83,10 +84,10 @@ def test_a_sample_is_solved_alike_alone_and_in_company(method: Method) -> None:
 
 def test_one_step_of_damped_least_squares_is_the_textbook_formula() -> None:
     q, target = bent(7, 5), LEG.reach(bent(8, 5))
-    settings = IkSettings(max_iterations=1, damping=0.3, gain=0.7)
+    settings = IkSettings(max_iterations=1, damping=0.3, gain=0.7, starts=1)
     found = solve_limb(CHAIN, target, "dls", q, settings, (5,))
     for k in range(5):
-        J = missing(CHAIN, q[k : k + 1], target[k : k + 1])[1][0]
+        J = residual(CHAIN, q[k : k + 1], target[k : k + 1])[1][0]
         # Least squares with the unknowns themselves as further, weighted equations.
         stacked = np.vstack([J, 0.3 * np.eye(6)])
         right = np.r_[lack(q[k : k + 1], target[k : k + 1])[0], np.zeros(6)]
@@ -97,9 +98,9 @@ def test_one_step_of_damped_least_squares_is_the_textbook_formula() -> None:
 
 def test_one_step_of_the_pseudoinverse_is_the_shortest_that_solves_the_linear_equations() -> None:
     q, target = bent(9, 5), LEG.reach(bent(10, 5))
-    found = solve_limb(CHAIN, target, "pinv", q, IkSettings(max_iterations=1), (5,))
+    found = solve_limb(CHAIN, target, "pinv", q, IkSettings(max_iterations=1, starts=1), (5,))
     for k in range(5):
-        J = missing(CHAIN, q[k : k + 1], target[k : k + 1])[1][0]
+        J = residual(CHAIN, q[k : k + 1], target[k : k + 1])[1][0]
         step = np.linalg.lstsq(J, lack(q[k : k + 1], target[k : k + 1])[0], rcond=None)[0]
         assert apart(found.best[k], q[k] + step) < 1e-12
 
@@ -136,19 +137,21 @@ def test_out_of_reach_newton_and_the_closed_form_end_at_one_least_squares_answer
 
 def test_positions_alone_are_reached_by_arms_of_three_joints() -> None:
     robot = load_robot("bioloid")
-    chain = Chain.of(robot, "right_arm")
+    chain = SerialChain.of(robot, "right_arm")
     start = np.array(robot.posture("home").q)[list(chain.joints)]
     place = np.array([[0.03, -0.08, 0.02], [0.02, -0.10, 0.03]])
     for method in NUMERIC:
         found = solve_limb(chain, place, method, np.tile(start, (2, 1)), IkSettings(), (2,))
         assert found.valid.all()
+    closed = solve_limb(chain, place, "closed", np.tile(start, (2, 1)), IkSettings(), (2,))
+    np.testing.assert_allclose(closed.best, found.best, atol=1e-8)
     with pytest.raises(InputError, match="closed needs poses"):
-        solve_limb(chain, place, "closed", np.tile(start, (2, 1)), IkSettings(), (2,))
+        solve_limb(CHAIN, place, "closed", np.zeros((2, 6)), IkSettings(), (2,))
 
 
 def test_the_hybrids_hip_is_where_the_paper_puts_it() -> None:
     """Paper B's similar leg: hip centre at (0, y0 + y1 - y3, -z2); the axes keep their directions."""
-    similar = spherical_variant(Chain.of(load_robot("poppy12"), "left_leg"))
+    similar = spherical_variant(SerialChain.of(load_robot("poppy12"), "left_leg"))
     hip = meeting(similar, (0, 1, 2))
     assert hip is not None
     np.testing.assert_allclose(list(hip), [0.0, 0.048, -0.047], atol=1e-15)
@@ -164,7 +167,7 @@ def test_a_hybrid_seed_of_a_spherical_leg_is_its_solution() -> None:
 
 
 def test_a_hybrid_seed_prefers_the_limits_then_the_guess() -> None:
-    chain = Chain.of(load_robot("poppy12"), "left_leg")
+    chain = SerialChain.of(load_robot("poppy12"), "left_leg")
     q = np.random.default_rng(16).uniform(chain.lower, chain.upper, (300, 6))
     seed = hybrid_seed(chain, LEG.reach(q), np.zeros((300, 6)))
     # The paper: a seed is off by 21 mm in the median over the joint box, 61 mm at most.
@@ -182,7 +185,7 @@ def test_hybrids_that_do_not_fit_are_refused_by_name() -> None:
             replace(wrist, points=wrist.points + np.arange(6.0)[:, None]).chain(),
             target, "hybrid", start, IkSettings(), (1,),
         )  # fmt: skip
-    arm = Chain.of(load_robot("bioloid"), "left_arm")
+    arm = SerialChain.of(load_robot("bioloid"), "left_arm")
     with pytest.raises(InputError, match="six revolute joints are needed"):
         solve_limb(arm, target, "hybrid", np.zeros((1, 3)), IkSettings(), (1,))
     with pytest.raises(InputError, match="hybrid needs poses"):

@@ -14,7 +14,7 @@ from screwkin.algebra.quartic import circle_roots
 from screwkin.algebra.se3 import UNTURNED, Pose, Vector, as_array, cross, dot, rotate
 from screwkin.ik.spherical_hip import spherical_hip_branches
 from screwkin.ik.subproblems import three_turns, turn_onto, turns_to_level, two_turns
-from screwkin.kinematics.serial_chain import Chain
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.model.table import load_robot
 from tests.strategies import angles, unit_vectors, vectors
 
@@ -111,7 +111,7 @@ def test_three_turns_make_the_rotation_and_one_triple_is_the_given_one(seed):
 
 def knee(x, y, z):
     """First branch of a spherical leg for an upright foot at (x, y, z)."""
-    chain = Chain.of(load_robot("bioloid"), "left_leg")
+    chain = SerialChain.of(load_robot("bioloid"), "left_leg")
     hip, ankle = chain.screws[0].s0, chain.screws[5].s0
     D = Pose(UNTURNED, Vector(x, y, z) - chain.tip.p)
     return spherical_hip_branches(chain.screws, hip, ankle, D)[0][:6]

@@ -79,11 +79,24 @@ def test_all_methods_agree_near_the_guess(method: str, robot: Robot) -> None:
 def test_a_limb_without_closed_form_is_solved_numerically_by_default(robot: Robot) -> None:
     state = around_home(robot, (4,))
     T = frame_pose(robot, state, "left_hand")
-    for target in (T, T[..., :3, 3]):
-        found = limb_ik(robot, "left_arm", target)
-        assert found.method == "newton"
-        assert found.q.shape == (4, 1, 3)
-        assert found.valid.all()
+    found = limb_ik(robot, "left_arm", T)
+    assert found.method == "newton"
+    assert found.q.shape == (4, 1, 3)
+    assert found.valid.all()
+    sole = frame_pose(robot, state, "left_foot")[..., :3, 3]
+    placed = limb_ik(robot, "left_leg", sole)
+    assert placed.method == "newton"
+    assert placed.q.shape == (4, 1, 6)
+    assert placed.valid.all()
+
+
+def test_a_hand_s_position_has_all_its_branches_in_closed_form(robot: Robot) -> None:
+    state = around_home(robot, (4,))
+    q = state.q[:, joints_of(robot, "left_arm")]
+    found = limb_ik(robot, "left_arm", frame_pose(robot, state, "left_hand")[..., :3, 3], guess=q)
+    assert found.method == "closed"
+    assert found.q.shape == (4, 4, 3)
+    np.testing.assert_allclose(found.best, q, atol=1e-9)
 
 
 def test_jax_arrays_are_taken_too(robot: Robot, x64: None) -> None:

@@ -1,4 +1,4 @@
-"""Workspace maps by kernels against the readable path: the same causes, positions and condition numbers."""
+"""Workspace points by programs against their fallback: the same causes, positions and condition numbers."""
 
 from __future__ import annotations
 
@@ -10,8 +10,11 @@ import pytest
 import screwkin as sk
 from screwkin.analysis import workspace as maps
 from screwkin.compiler.run import run
+from screwkin.ik import reach as reaching
+from screwkin.ik.limb import resting
 from screwkin.ik.limb_map import limb_map
-from screwkin.kinematics.serial_chain import Chain
+from screwkin.ik.reach import REACHABLE, reach
+from screwkin.kinematics.serial_chain import SerialChain
 from tests.compiler.robots import with_leg
 from tests.ik.legs import backwards, random_parallel_leg, random_spherical_leg
 
@@ -23,28 +26,39 @@ def points_of(chain, height, resolution):
     return np.stack([x[i], y[j], np.full(len(i), -height)], axis=1)
 
 
-def agree(robot, limb, points, surely=0.99):
-    """Causes, positions and conditioning of both paths; the share of samples that the kernel is sure of."""
-    chain = Chain.of(robot, limb)
-    length, guess = maps.normalising_length(chain), maps._guess(robot, chain)
-    cause, q, inverse = maps._found(chain, points, guess, length)
-    told = maps._compiled(robot, chain, points, guess, length)
-    np.testing.assert_array_equal(told[0], cause)
-    np.testing.assert_allclose(told[1], q, atol=1e-9)
-    reached = cause == maps.REACHABLE
-    assert np.isnan(told[2][~reached]).all()
-    # 1e-12 times the condition number of each value, relative to it.
-    np.testing.assert_allclose(told[2][reached], inverse[reached], rtol=0, atol=1e-12)
-    sure = run(limb_map(robot, chain.limb, tuple(guess.tolist()), length), {"point": points})["sure"]
-    assert sure[:, 0].mean() >= surely
-    assert sure[reached, 1].mean() >= surely
-    return cause
+def by_fallback(monkeypatch, *arguments):
+    """What is reached by a limb that is taken for one without a closed form's program."""
+    with monkeypatch.context() as patch:
+        patch.setattr(reaching, "recognised", lambda *_: None)
+        return reach(*arguments)
+
+
+@pytest.fixture
+def agree(monkeypatch):
+    def check(robot, limb, points, share=0.99):
+        """Causes, positions and conditioning by both; at least a share of the samples is certified."""
+        chain = SerialChain.of(robot, limb)
+        length, guess = maps.normalising_length(chain), resting(robot, chain)
+        cause, q, inverse = by_fallback(monkeypatch, robot, limb, points, guess, length)
+        mine = reach(robot, limb, points, guess, length)
+        np.testing.assert_array_equal(mine.cause, cause)
+        np.testing.assert_allclose(mine.q, q, atol=1e-9)
+        reached = cause == REACHABLE
+        assert np.isnan(mine.inverse_condition[~reached]).all()
+        # 1e-12 times the condition number of each value, relative to it.
+        np.testing.assert_allclose(mine.inverse_condition[reached], inverse[reached], rtol=0, atol=1e-12)
+        out = run(limb_map(robot, chain.limb, tuple(guess.tolist()), length), {"point": points})
+        assert (out["certified"][:, 0] > 0).mean() >= share
+        assert (out["certified"][reached, 1] > 0).mean() >= share
+        return cause
+
+    return check
 
 
 @pytest.mark.parametrize(("name", "limb"), [("bioloid", "left_leg"), ("poppy12", "right_leg")])
-def test_maps_of_bundled_legs_are_those_of_the_readable_path(name, limb):
+def test_maps_of_bundled_legs_are_those_of_the_fallback(agree, name, limb):
     robot = sk.load_robot(name)
-    chain = Chain.of(robot, limb)
+    chain = SerialChain.of(robot, limb)
     heights = maps.default_heights(robot, limb)
     points = np.concatenate([points_of(chain, h, 0.008 if name == "bioloid" else 0.02) for h in heights])
     causes = agree(robot, limb, points)
@@ -56,17 +70,17 @@ def test_maps_of_bundled_legs_are_those_of_the_readable_path(name, limb):
     [random_spherical_leg(1), random_parallel_leg(2), backwards(random_spherical_leg(3), 3)],
     ids=["spherical", "parallel", "backwards"],
 )
-def test_maps_of_legs_with_any_axes(leg):
+def test_maps_of_legs_with_any_axes(agree, leg):
     robot = with_leg(leg, 5)
-    chain = Chain.of(robot, "left_leg")
+    chain = SerialChain.of(robot, "left_leg")
     rng = np.random.default_rng(0)
     points = float(chain.tip.p.x), float(chain.tip.p.y), float(chain.tip.p.z)
     causes = agree(robot, "left_leg", points + rng.normal(size=(1500, 3)), 0.95)
-    assert maps.REACHABLE in causes
+    assert REACHABLE in causes
     assert len(set(causes)) > 2
 
 
-def test_mirror_images_straight_legs_and_borders_are_decided_as_the_readable_path_does():
+def test_mirror_images_straight_legs_and_borders_are_decided_as_the_fallback_does(agree):
     """Without limits and with the middle as guess, knees bend forward or backward equally well."""
     robot = sk.load_robot("bioloid")
     free = replace(
@@ -74,7 +88,7 @@ def test_mirror_images_straight_legs_and_borders_are_decided_as_the_readable_pat
         postures=(),
         joints=tuple(replace(joint, lower=-np.inf, upper=np.inf) for joint in robot.joints),
     )
-    chain = Chain.of(free, "left_leg")
+    chain = SerialChain.of(free, "left_leg")
     hip, tip = (np.array([float(c) for c in p]) for p in (chain.screws[0].s0, chain.tip.p))
     share, ankle = np.linspace(0.0, 1.0, 30)[:, None], np.array([0.0, 0.0, 0.030779])
     up, forward = share * np.array([0.0, 0.0, 0.05]), share * np.array([0.05, 0.0, 0.0])
@@ -91,12 +105,12 @@ def test_mirror_images_straight_legs_and_borders_are_decided_as_the_readable_pat
     agree(limited, "left_leg", np.concatenate([points, points + np.array([0.01, 0.02, 0.06])]), 0.0)
 
 
-def test_a_level_is_the_same_by_the_kernel_and_without_it(monkeypatch):
+def test_a_level_is_the_same_by_programs_and_without_them(monkeypatch):
     robot = sk.load_robot("poppy12")
-    by_kernel = maps.workspace(robot, "left_leg", [0.375], 0.012)[0]
-    monkeypatch.setattr(maps, "FROM", 10**9)
-    readable = maps.workspace(robot, "left_leg", [0.375], 0.012)[0]
-    np.testing.assert_array_equal(by_kernel.cause, readable.cause)
-    np.testing.assert_array_equal(by_kernel.x, readable.x)
-    np.testing.assert_allclose(by_kernel.q, readable.q, atol=1e-9)
-    np.testing.assert_allclose(by_kernel.inverse_condition, readable.inverse_condition, rtol=1e-11)
+    by_program = maps.workspace(robot, "left_leg", [0.375], 0.012)[0]
+    monkeypatch.setattr(reaching, "recognised", lambda *_: None)
+    other = maps.workspace(robot, "left_leg", [0.375], 0.012)[0]
+    np.testing.assert_array_equal(by_program.cause, other.cause)
+    np.testing.assert_array_equal(by_program.x, other.x)
+    np.testing.assert_allclose(by_program.q, other.q, atol=1e-9)
+    np.testing.assert_allclose(by_program.inverse_condition, other.inverse_condition, rtol=1e-11)

@@ -45,14 +45,24 @@ def test_the_numbers_are_those_of_numpy(ask) -> None:
 
 
 @pytest.mark.skipif(native.compiler() is None, reason="no C compiler here")
-def test_machine_code_runs_inside_large_batches_only() -> None:
+def test_machine_code_runs_inside_compiled_functions_whatever_the_batch() -> None:
     def text(count: int) -> str:
         T, q, *_ = given(count)
         f = jax.jit(lambda T, q: sk.center_of_mass(ROBOT, sk.State(T, q)))
         return str(f.lower(T, q).as_text())
 
-    assert "screwkin." in text(1000)
-    assert "screwkin." not in text(1000 - 1)
+    assert all("screwkin." in text(count) for count in (1, 999, 1000))
+
+
+def test_a_function_of_one_sample_over_vmap_is_the_batch() -> None:
+    T, q, *_ = given(50)
+
+    def poses(T, q):
+        return sk.link_poses(ROBOT, sk.State(T, q))
+
+    over, whole = jax.jit(jax.vmap(poses)), jax.jit(poses)
+    np.testing.assert_array_equal(over(T, q), whole(T, q))
+    assert over.lower(T, q).as_text().count("custom_call @screwkin.") == 1
 
 
 def test_gradients_of_a_large_batch_are_those_of_its_samples() -> None:

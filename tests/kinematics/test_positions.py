@@ -73,20 +73,23 @@ def test_the_jacobian_of_a_frame_gives_its_velocity_by_differences(seed):
     ends = [sk.frame_pose(robot, moved(state, base, qd, t), name) for t in (-h, h)]
     wanted = spatial_velocity(*ends, 2 * h)
     arm = sk.frame_pose(robot, state, name)[:3, 3] - state.T_world_base[:3, 3]
-    told_there = np.r_[base[:3], base[3:] + np.cross(base[:3], arm)]
     J = sk.jacobian(robot, state, name)
-    np.testing.assert_allclose(J @ np.r_[told_there, qd], wanted, atol=1e-8)
+    np.testing.assert_allclose(J @ np.r_[base, qd], wanted, atol=1e-8)
+    there = np.r_[base[:3], base[3:] + np.cross(base[:3], arm)]
+    J = sk.jacobian(robot, state, name, base_twist_at="point")
+    np.testing.assert_allclose(J @ np.r_[there, qd], wanted, atol=1e-8)
     np.testing.assert_array_equal(J[:, :6], np.eye(6))
 
 
 @given(seed=seeds)
 @settings(max_examples=10, derandomize=True)
-def test_told_at_another_point_only_velocities_change(seed):
+def test_expressed_at_another_point_only_velocities_change(seed):
     robot = random_tree(seed)
     state = random_state(robot, seed)
     point = np.random.default_rng(seed).uniform(-1, 1, 3)
     name = robot.link_names[-1]
-    here, there = sk.jacobian(robot, state, name), sk.jacobian(robot, state, name, point=point)
+    here = sk.jacobian(robot, state, name)
+    there = sk.jacobian(robot, state, name, point=point, base_twist_at="point")
     arm = point - sk.frame_pose(robot, state, name)[:3, 3]
     np.testing.assert_allclose(there[:3], here[:3], atol=1e-15)
     shifted = here[3:, 6:] + np.cross(here[:3, 6:], arm, axisa=0, axisb=0, axisc=0)

@@ -12,7 +12,7 @@ from screwkin.algebra.linear import cramer, orthogonal
 from screwkin.algebra.quartic import circle_points, cube_root
 from screwkin.algebra.screws import Screw
 from screwkin.algebra.se3 import Twist, Vector, as_array, vector_from_array
-from screwkin.kinematics.serial_chain import Chain
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.limb_rates import doubtful, pose_rates, split_of
 from tests.kinematics.machines import point, unit
 
@@ -27,9 +27,9 @@ def test_the_bundled_legs_have_their_splits():
         ("poppy12", "parallel", 2),
         ("bioloid24", "meeting", 0),
     ):
-        split = split_of(Chain.of(sk.load_robot(limb), "left_leg"))
+        split = split_of(SerialChain.of(sk.load_robot(limb), "left_leg"))
         assert (split.kind, split.first) == (kind, first)
-    assert split_of(Chain.of(sk.load_robot("bioloid"), "left_arm")) is None
+    assert split_of(SerialChain.of(sk.load_robot("bioloid"), "left_arm")) is None
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -58,7 +58,7 @@ def test_splits_give_the_determinant_and_rates_of_the_whole_matrix(name, seed):
     rng = np.random.default_rng(seed)
     robot = sk.load_robot(name)
     for limb in robot.limbs:
-        chain = Chain.of(robot, limb.name)
+        chain = SerialChain.of(robot, limb.name)
         if len(chain.joints) != 6:
             continue
         state = sk.State(np.eye(4), sk.home(robot).q + rng.uniform(-0.3, 0.3, len(robot.joints)))

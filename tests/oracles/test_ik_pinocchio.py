@@ -8,8 +8,9 @@ import pytest
 from screwkin.algebra.se3 import as_array
 from screwkin.analysis.ik_others import pinocchio_clik, pinocchio_model
 from screwkin.analysis.ik_targets import random_targets, walking_path, walking_targets
-from screwkin.ik.numeric import IkSettings, solve_limb
-from screwkin.kinematics.serial_chain import Chain
+from screwkin.ik.limb import solve_limb
+from screwkin.ik.numeric import IkSettings
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.model.table import load_robot
 from tests.ik.legs import apart
 
@@ -25,7 +26,7 @@ LIMBS = [
 
 @pytest.mark.parametrize(("robot", "limb"), LIMBS)
 def test_pinocchio_puts_every_branch_at_the_target(robot: str, limb: str) -> None:
-    chain = Chain.of(load_robot(robot), limb)
+    chain = SerialChain.of(load_robot(robot), limb)
     target = random_targets(chain, 100, 1)
     found = solve_limb(chain, target, "closed", np.zeros((100, 6)), IkSettings(), (100,))
     model = pinocchio_model(pin, chain)
@@ -42,7 +43,7 @@ def test_pinocchio_puts_every_branch_at_the_target(robot: str, limb: str) -> Non
 
 @pytest.mark.parametrize(("robot", "limb"), LIMBS)
 def test_what_pinocchios_iteration_finds_is_among_the_branches(robot: str, limb: str) -> None:
-    chain = Chain.of(load_robot(robot), limb)
+    chain = SerialChain.of(load_robot(robot), limb)
     target = random_targets(chain, 30, 2)
     outcome = pinocchio_clik(chain, target, IkSettings(1e-9, 1e-9, 300))
     assert outcome is not None
@@ -56,7 +57,7 @@ def test_what_pinocchios_iteration_finds_is_among_the_branches(robot: str, limb:
 
 def test_its_iterations_count_as_a_geometric_decay_predicts() -> None:
     """A step of a tenth leaves 0.9 of the error: from 0.4 to 1e-6 takes about 120 iterations."""
-    chain = Chain.of(load_robot("bioloid"), "left_leg")
+    chain = SerialChain.of(load_robot("bioloid"), "left_leg")
     target = walking_targets(chain, walking_path(chain))[::75]
     outcome = pinocchio_clik(chain, target, IkSettings(1e-6, 1e-6, 500))
     assert outcome is not None

@@ -74,7 +74,7 @@ def test_link_jacobians_agree(case: Case) -> None:
     rng = np.random.default_rng(8)
     for name in (case.robot.link_names[0], case.robot.link_names[4], case.robot.link_names[-1]):
         points = rng.uniform(-1, 1, (len(state.q), 3))
-        ours = sk.jacobian(case.robot, state, name, points)
+        ours = sk.jacobian(case.robot, state, name, points, base_twist_at="point")
         for k, P in case.states():
             linear, angular = np.zeros((3, case.model.nv)), np.zeros((3, case.model.nv))
             body = case.model.body(name).id

@@ -76,7 +76,7 @@ def test_link_jacobians_agree(case: Case) -> None:
     for name in (case.robot.link_names[0], case.robot.link_names[4], case.robot.link_names[-1]):
         frame = case.model.getFrameId(name, pin.FrameType.BODY)
         points = poses_in_urdf_frames(case.robot, state)[:, case.robot.link_names.index(name), :3, 3]
-        ours = sk.jacobian(case.robot, state, name, points)
+        ours = sk.jacobian(case.robot, state, name, points, base_twist_at="point")
         for k, q, P in case.states():
             J = pin.computeFrameJacobian(case.model, case.data, q, frame, pin.LOCAL_WORLD_ALIGNED) @ P
             # v of the base origin is v of the point plus away x omega.

@@ -1,0 +1,189 @@
+"""Several quantities of a robot as one compiled program: for loops over samples and for large batches.
+
+This is where compilation happens, and ``prepare`` is the other place: no call of a quantity compiles.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from screwkin.algebra.arrays import Array
+from screwkin.compiler.program import Program, Recorder
+from screwkin.compiler.records import identifier
+from screwkin.compiler.run import machine_code, run_rows
+from screwkin.errors import InputError
+from screwkin.export.quantities import QUANTITIES, choices_of, quantity_of, subject_of
+from screwkin.kinematics.arrays import Argument
+from screwkin.kinematics.door import Door
+from screwkin.kinematics.formula import Definition, Given
+from screwkin.kinematics.kinds import STATE
+from screwkin.model.robot import Robot
+from screwkin.model.state import State
+
+Choice = str | tuple[str, ...]
+"""A quantity by its name; with choices, as ``("frame_pose", "right_foot")``."""
+
+
+def bind(robot: Robot, *quantities: Choice, optional: Sequence[str] = ()) -> Bound:
+    """Several quantities as one function, compiled once, with its checks: for loops and for large batches.
+
+    What quantities share is computed once. It needs a C compiler to be fast; without one it computes as the
+    plain functions do.
+
+    Args:
+        robot: n joints.
+        quantities: names of quantities, such as ``"tip_poses"`` or ``("frame_pose", "right_foot")``.
+        optional: names of arguments with a default that shall be arrays, such as ``"base_twist"``.
+
+    Returns:
+        A function of a state and of the arrays that the quantities need, by name. Of one quantity it returns
+        the array, of several a named tuple of arrays.
+
+    Raises:
+        UnknownNameError: no such quantity, frame or limb.
+
+    Example:
+        >>> import screwkin as sk
+        >>> robot = sk.load_robot(sk.robot_names()[0])
+        >>> fk = sk.bind(robot, "tip_poses", "center_of_mass")
+        >>> found = fk(sk.home(robot))
+        >>> found.tip_poses.shape, found.center_of_mass.shape
+        ((4, 4, 4), (3,))
+    """
+    if not quantities:
+        raise InputError(f"nothing to bind; quantities: {', '.join(QUANTITIES)}")
+    return Bound(robot, [_named(robot, choice, optional) for choice in quantities])
+
+
+def prepare(robot: Robot, *quantities: Choice) -> None:
+    """Compile what plain calls of quantities compute, so that from now on they run machine code.
+
+    Results are those of before to rounding. Without a C compiler nothing changes.
+
+    Args:
+        robot: n joints.
+        quantities: as for ``bind``; default: all. Of a frame or limb without a choice: all tips or limbs.
+            Arguments with a default are prepared both ways, all left out and all given.
+
+    Example:
+        >>> import screwkin as sk
+        >>> robot = sk.load_robot(sk.robot_names()[0])
+        >>> sk.prepare(robot, ("frame_pose", "right_foot"))
+        >>> sk.frame_pose(robot, sk.home(robot), "right_foot").shape
+        (4, 4)
+    """
+    for choice in quantities or tuple(QUANTITIES):
+        name, *words = (choice,) if isinstance(choice, str) else choice
+        quantity = quantity_of(name)
+        every = [tuple(words)] if words else choices_of(robot, quantity)
+        for optional in {(), quantity.definition.arrays_by_default}:
+            for chosen in every:
+                subject, definition, given, choices, _ = _named(robot, (name, *chosen), optional)
+                definition.door(subject, given, choices).prepare()
+
+
+Part = tuple[Any, Definition, tuple[Given, ...], tuple[Any, ...], str]
+
+
+def _named(robot: Robot, choice: Choice, optional: Sequence[str]) -> Part:
+    """Subject, definition, given arguments, choices and name of a quantity."""
+    name, *words = (choice,) if isinstance(choice, str) else choice
+    quantity = quantity_of(name)
+    definition = quantity.definition
+    subject = subject_of(robot, quantity)
+    given = definition.inputs(subject, optional)
+    return subject, definition, given, definition.chosen(words), identifier(name, *words) if words else name
+
+
+class Bound:
+    """What ``bind`` returns.
+
+    Attributes:
+        program: all quantities as one straight-line program.
+    """
+
+    def __init__(self, robot: Robot, parts: Sequence[Part]) -> None:
+        about = ", ".join(name for *_, name in parts)
+        recorder = Recorder(
+            identifier(robot.name, *(name for *_, name in parts)), f"{about} of {robot.name}."
+        )
+        arguments: dict[str, Argument] = {}
+        sources: dict[str, str] = {}
+        names: list[str] = []
+        for subject, definition, given, choices, name in parts:
+            for parameter, own in definition.arguments(robot, given).items():
+                arguments |= {a.name: a for a in own}
+                sources |= {a.name: parameter for a in own}
+            for key, (shape, flat) in definition.traced(recorder, subject, given, choices).items():
+                names.append(name if key == definition.name else key)
+                recorder.output(names[-1], flat, *shape)
+        self._door = Door(recorder, list(arguments.values())).prepare()
+        self._reads = [(sources[a.name], a.of) for a in self._door.arguments]
+        self._needs = {source for source, _ in self._reads} - set(STATE)
+        self._results = namedtuple("Results", names) if len(names) > 1 else None
+
+    @property
+    def program(self) -> Program:
+        """All quantities as one straight-line program."""
+        return self._door.program
+
+    def __call__(self, state: State, **arrays: Any) -> Any:
+        """The quantities at states with any leading batch dimensions.
+
+        Raises:
+            ShapeError: a wrong shape, NaN or infinity, a base pose that is not rigid.
+            InputError: an array is missing or not an argument of the quantities.
+        """
+        found = self._door(self._read(state, arrays))
+        return self._results(*found) if self._results else found[0]
+
+    def in_place(self, state: State, **arrays: Any) -> tuple[Callable[[], object], Any]:
+        """For the innermost loop: a call that reads these very arrays anew each time, and checks nothing.
+
+        Args:
+            state: C-contiguous float64 arrays of one batch, which must outlive the call.
+            arrays: likewise.
+
+        Returns:
+            The call, without arguments, and the results, which it fills.
+        """
+        values = self._read(state, arrays)
+        door = self._door
+        batch = door.batch(values)
+        if batch is None:
+            raise InputError("in_place takes C-contiguous float64 NumPy arrays of one batch")
+        results = [np.zeros((*batch, *group.shape)) for group in door.program.outputs]
+        inputs, outputs = door.arguments, door.program.outputs
+        rows = [x.reshape(-1, math.prod(a.shape)) for a, x in zip(inputs, values, strict=True)]
+        filled = [x.reshape(-1, g.size) for g, x in zip(outputs, results, strict=True)]
+        native = machine_code(door.program)
+        if native is not None:
+            call: Callable[[], object] = native.bound(rows, filled)
+        else:
+
+            def call() -> object:
+                for to, row in zip(filled, run_rows(door.program, rows, len(filled[0])), strict=True):
+                    to[...] = row
+                return None
+
+        return call, self._results(*results) if self._results else results[0]
+
+    def _read(self, state: State, arrays: Mapping[str, Any]) -> list[Array]:
+        if arrays.keys() != self._needs:
+            missing, foreign = sorted(self._needs - arrays.keys()), sorted(arrays.keys() - self._needs)
+            raise InputError(
+                "; ".join(
+                    [f"missing: {', '.join(missing)}"] * bool(missing)
+                    + [f"not an argument: {', '.join(foreign)}"] * bool(foreign)
+                )
+            )
+        values = []
+        for source, of in self._reads:
+            value = getattr(state, source) if source in STATE else arrays[source]
+            values.append(value[of] if of else value)
+        return values

@@ -1,0 +1,74 @@
+"""The quantities that formulas define, by name: what can be bound, prepared and written as C."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from screwkin.compiler.program import Program
+from screwkin.dynamics.quantities import balance, ground_wrench, inverse_dynamics, mass_matrix, momentum
+from screwkin.errors import UnknownNameError
+from screwkin.kinematics.body import (
+    center_of_mass,
+    com_jacobian,
+    frame_pose,
+    jacobian,
+    limb_jacobian,
+    link_poses,
+    tip_poses,
+)
+from screwkin.kinematics.formula import Quantity
+from screwkin.mechanism.choice import closed_mechanism
+from screwkin.mechanism.quantities import network_matrix, virtual_motion
+from screwkin.model.robot import Robot
+
+QUANTITIES: Mapping[str, Quantity] = {
+    quantity.__name__: quantity
+    for quantity in (
+        link_poses,
+        frame_pose,
+        tip_poses,
+        jacobian,
+        limb_jacobian,
+        center_of_mass,
+        com_jacobian,
+        momentum,
+        mass_matrix,
+        inverse_dynamics,
+        ground_wrench,
+        balance,
+        network_matrix,
+        virtual_motion,
+    )
+}
+"""Every quantity that a formula defines. A new one needs its definition and its row here."""
+
+
+def quantity_of(name: str) -> Quantity:
+    """The quantity of that name.
+
+    Raises:
+        UnknownNameError: no such quantity.
+    """
+    if name not in QUANTITIES:
+        raise UnknownNameError("quantity", name, tuple(QUANTITIES))
+    return QUANTITIES[name]
+
+
+def subject_of(robot: Robot, quantity: Quantity) -> object:
+    """What a quantity is of: the robot, or its closed mechanism."""
+    return closed_mechanism(robot) if quantity.definition.parameters[0] == "mechanism" else robot
+
+
+def choices_of(robot: Robot, quantity: Quantity) -> list[tuple[str, ...]]:
+    """The choices that a quantity leaves: of a limb every limb, of a frame every tip; else an empty one."""
+    choices = quantity.definition.choices
+    if "limb" in choices:
+        return [(limb.name,) for limb in robot.limbs]
+    return [(tip,) for tip in robot.tip_names] if "frame" in choices else [()]
+
+
+def programs(robot: Robot, name: str) -> list[Program]:
+    """The programs of a quantity, all arrays with a default among the inputs: one for every choice."""
+    quantity = quantity_of(name)
+    subject, optional = subject_of(robot, quantity), quantity.definition.arrays_by_default
+    return [quantity.program(subject, *choice, optional=optional) for choice in choices_of(robot, quantity)]

@@ -1,0 +1,145 @@
+"""A program behind its checks: what every public function of arrays does, in as little time as can be.
+
+The checks are a formula themselves, part of the program: one more output, the *guard*, tells whether all
+inputs are finite and poses rigid. Only where it objects are the arrays read again, to say what is wrong.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.scalar import Scalar, is_jax, where
+from screwkin.compiler.program import Recorder
+from screwkin.compiler.run import chosen_path, machine_code, prepare, python_function, run_rows
+from screwkin.kinematics.arrays import Argument, checked_inputs, input_rows
+from screwkin.kinematics.rigid import deviation
+from screwkin.model.state import RIGID
+
+FLOAT = np.dtype(float)
+
+
+class Door:
+    """Calls of a program with arrays of any batch.
+
+    Args:
+        recorder: a recording with all outputs.
+        arguments: its inputs, with what messages call them.
+
+    Attributes:
+        program: as recorded.
+        guarded: the same with the guard as one more output.
+    """
+
+    def __init__(self, recorder: Recorder, arguments: Sequence[Argument]) -> None:
+        self.program = recorder.program()
+        by_name = {argument.name: argument for argument in arguments}
+        self.arguments = tuple(by_name[group.name] for group in self.program.inputs)
+        recorder.output("guard", [_guard(recorder, self.arguments)])
+        self.guarded = recorder.program()
+        self.names = [group.name for group in self.program.outputs]
+        self._shapes = [a.shape for a in self.arguments]
+        self._outputs = [group.shape for group in self.program.outputs]
+
+    def prepare(self) -> Door:
+        """Compile the program, if there is a compiler; later calls use machine code."""
+        prepare(self.guarded)
+        return self
+
+    def __call__(self, arrays: Sequence[Any]) -> list[Array]:
+        """Every output (*batch, *shape), from the inputs in their order.
+
+        Raises:
+            ShapeError: a wrong shape, NaN or infinity, a pose that is not rigid, or batches that do not fit.
+        """
+        if any(map(is_jax, arrays)):
+            return self._by_jax(arrays)
+        way = chosen_path(self.guarded, 1)
+        found = (
+            self._one_sample(arrays) if way == "python" else self._in_place(arrays) if way == "C" else None
+        )
+        if found is not None:
+            return found
+        rows, batch = input_rows(self.arguments, arrays)
+        *outputs, guard = run_rows(self.guarded, rows, math.prod(batch))
+        if not (guard <= RIGID).all():
+            checked_inputs(self.arguments, arrays)
+        return [x.reshape(*batch, *s) for x, s in zip(outputs, self._outputs, strict=True)]
+
+    def batch(self, arrays: Sequence[Any]) -> tuple[int, ...] | None:
+        """The batch of C-contiguous float64 arrays that have one and the same; None of any others."""
+        batch: tuple[int, ...] | None = None
+        for array, shape in zip(arrays, self._shapes, strict=True):
+            if type(array) is not np.ndarray or array.dtype is not FLOAT or not array.flags.c_contiguous:
+                return None
+            axes = array.ndim - len(shape)
+            own = array.shape
+            if axes < 0 or own[axes:] != shape:
+                return None
+            if batch is None:
+                batch = own[:axes]
+            elif own[:axes] != batch:
+                return None
+        return batch
+
+    def _in_place(self, arrays: Sequence[Any]) -> list[Array] | None:
+        """By machine code that reads the arrays where they are; None if that is not possible."""
+        batch = self.batch(arrays)
+        if not batch and batch != ():
+            return None
+        outputs = [np.empty(batch + shape) for shape in self._outputs]
+        guard = np.empty(batch)
+        native = machine_code(self.guarded)
+        assert native is not None
+        native.at(math.prod(batch), arrays, [*outputs, guard])()
+        return outputs if guard.max() <= RIGID else None  # the slow way says what is wrong
+
+    @cached_property
+    def _python(self) -> Callable[..., Sequence[list[float]]]:
+        return python_function(self.guarded)
+
+    def _one_sample(self, arrays: Sequence[Any]) -> list[Array] | None:
+        """One sample by generated Python; None if it is not one, or if anything about it is doubtful."""
+        rows: list[Any] = []
+        for array, shape in zip(arrays, self._shapes, strict=True):
+            if type(array) is np.ndarray and array.dtype is FLOAT and array.shape == shape:
+                rows.append(array.tolist() if len(shape) == 1 else array.ravel().tolist())
+            elif type(array) is float and not shape:
+                rows.append((array,))
+            else:
+                return None
+        try:
+            *outputs, (guard,) = self._python(*rows)
+        except (ArithmeticError, ValueError):  # by Python; other paths give infinity or NaN
+            return None
+        if not guard <= RIGID:
+            return None
+        return [np.array(x).reshape(s) for x, s in zip(outputs, self._outputs, strict=True)]
+
+    def _by_jax(self, arrays: Sequence[Any]) -> list[Any]:
+        from screwkin.compiler import xla_call
+
+        inputs, _ = checked_inputs(self.arguments, arrays)
+        named = {a.name: x for a, x in zip(self.arguments, inputs, strict=True)}
+        found = xla_call.run(self.program, named)
+        return [found[group.name] for group in self.program.outputs]
+
+
+def _guard(recorder: Recorder, arguments: Sequence[Argument]) -> Scalar:
+    """0 where all inputs are finite and poses rigid; else how far a pose is from one, or infinity."""
+    total: Scalar = 0
+    worst: Scalar = 0.0
+    for argument in arguments:
+        scalars = recorder.shared(argument.name, *argument.shape)
+        for x in scalars:
+            total = total + x
+        if argument.rigid:
+            worst = deviation(scalars)
+    if isinstance(total, int):  # no inputs
+        return 0.0
+    return where((total < math.inf) & (total > -math.inf), worst, math.inf)
