@@ -22,7 +22,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.hermite import hermite, places
 from screwkin.algebra.se3 import as_array, rotation_exp, rotation_from_array, rotation_log
 from screwkin.errors import InputError, TrajectoryError, expect
-from screwkin.files import atomic_write, atomic_write_bytes, npz_bytes, read_npz
+from screwkin.files import atomic_write, atomic_write_bytes, csv_text, npz_bytes, read_npz, ros_text
 from screwkin.model.display import html_table, listing
 from screwkin.model.robot import Robot
 from screwkin.model.state import not_rigid
@@ -186,7 +186,10 @@ class Trajectory:
                 binary.write(npz_bytes(_arrays(self)))
         elif path.suffix in (".csv", ".json"):
             with atomic_write(path) as text:
-                text.write(_csv_text(self) if path.suffix == ".csv" else _ros_text(self))
+                joints = self.time, self.joint_names, self.q
+                text.write(
+                    csv_text(*joints) if path.suffix == ".csv" else ros_text(*joints, self.qd, self.qdd)
+                )
         else:
             raise TrajectoryError(f"{path}: unknown suffix {path.suffix!r}; use .npz, .csv or .json")
         return path
@@ -198,9 +201,19 @@ def load_trajectory(path: str | Path) -> Trajectory:
     Args:
         path: of the file.
 
+    Returns:
+        The motion with everything that the file holds, arrays read-only.
+
     Raises:
         InputError: not a path.
         TrajectoryError: not there, truncated, foreign, incomplete, inconsistent, or holding pickles.
+
+    Example:
+        >>> import screwkin as sk
+        >>> robot = sk.load_robot(sk.robot_names()[0])
+        >>> path = sk.walk(robot, sk.load_gait("walk"), steps=1).save("walk.npz")
+        >>> sk.load_trajectory(path).joint_names == robot.joint_names
+        True
     """
     expect(path, (str, Path), "path", "the path of an .npz file")
     path = Path(path)
@@ -363,37 +376,3 @@ def _from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Trajectory:
     if not isinstance(rest["meta"], dict):
         raise TrajectoryError("meta is not the text of a JSON object")
     return Trajectory(T_world_tip=tips, **rest)
-
-
-def _csv_text(trajectory: Trajectory) -> str:
-    """Time [s], then one column per joint [rad or m], with every digit that distinguishes a float."""
-    rows = [",".join(("time", *trajectory.joint_names))]
-    rows += [
-        ",".join(map(repr, (t, *q)))
-        for t, q in zip(trajectory.time.tolist(), trajectory.q.tolist(), strict=True)
-    ]
-    return "\n".join(rows) + "\n"
-
-
-def _ros_text(trajectory: Trajectory) -> str:
-    """The message trajectory_msgs/JointTrajectory, times counted from its first sample."""
-
-    def stamp(seconds: float) -> dict[str, int]:
-        whole, nano = divmod(round(seconds * 1e9), 10**9)
-        return {"sec": whole, "nanosec": nano}
-
-    columns = (a.tolist() for a in (trajectory.time, trajectory.q, trajectory.qd, trajectory.qdd))
-    start = float(trajectory.time[0])
-    points = [
-        {
-            "positions": q,
-            "velocities": qd,
-            "accelerations": qdd,
-            "effort": [],
-            "time_from_start": stamp(t - start),
-        }
-        for t, q, qd, qdd in zip(*columns, strict=True)
-    ]
-    header = {"stamp": stamp(0.0), "frame_id": ""}
-    names = list(trajectory.joint_names)
-    return json.dumps({"header": header, "joint_names": names, "points": points}) + "\n"
