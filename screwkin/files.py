@@ -1,4 +1,4 @@
-"""Files written beside, then renamed: nobody sees a half-written one; npz without pickles; motions as text."""
+"""Files written beside, then renamed: none is seen half-written; npz without pickles; motions as text."""
 
 from __future__ import annotations
 
