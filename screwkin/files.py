@@ -1,14 +1,15 @@
-"""Files written beside, then renamed, so that nobody sees a half-written one; npz without pickles."""
+"""Files written beside, then renamed: none is seen half-written; npz without pickles; motions as text."""
 
 from __future__ import annotations
 
 import io
+import json
 import secrets
 import tempfile
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO, TextIO
@@ -120,3 +121,39 @@ def read_npz(data: bytes) -> dict[str, NDArray[Any]]:
     if foreign:
         raise InputError(f"it holds files that are no arrays: {', '.join(foreign)}")
     return arrays
+
+
+def csv_text(time: NDArray[np.float64], joint_names: Sequence[str], q: NDArray[np.float64]) -> str:
+    """Time [s], then one column per joint [rad or m], with every digit that distinguishes a float."""
+    rows = [",".join(("time", *joint_names))]
+    rows += [",".join(map(repr, (t, *here))) for t, here in zip(time.tolist(), q.tolist(), strict=True)]
+    return "\n".join(rows) + "\n"
+
+
+def ros_text(
+    time: NDArray[np.float64],
+    joint_names: Sequence[str],
+    q: NDArray[np.float64],
+    qd: NDArray[np.float64],
+    qdd: NDArray[np.float64],
+) -> str:
+    """The message trajectory_msgs/JointTrajectory, times counted from its first sample."""
+
+    def stamp(seconds: float) -> dict[str, int]:
+        whole, nano = divmod(round(seconds * 1e9), 10**9)
+        return {"sec": whole, "nanosec": nano}
+
+    columns = (a.tolist() for a in (time, q, qd, qdd))
+    start = float(time[0])
+    points = [
+        {
+            "positions": positions,
+            "velocities": velocities,
+            "accelerations": accelerations,
+            "effort": [],
+            "time_from_start": stamp(t - start),
+        }
+        for t, positions, velocities, accelerations in zip(*columns, strict=True)
+    ]
+    header = {"stamp": stamp(0.0), "frame_id": ""}
+    return json.dumps({"header": header, "joint_names": list(joint_names), "points": points}) + "\n"

@@ -19,9 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
+from screwkin.algebra.hermite import hermite, places
 from screwkin.algebra.se3 import as_array, rotation_exp, rotation_from_array, rotation_log
 from screwkin.errors import InputError, TrajectoryError, expect
-from screwkin.files import atomic_write, atomic_write_bytes, npz_bytes, read_npz
+from screwkin.files import atomic_write, atomic_write_bytes, csv_text, npz_bytes, read_npz, ros_text
 from screwkin.model.display import html_table, listing
 from screwkin.model.robot import Robot
 from screwkin.model.state import not_rigid
@@ -140,32 +141,27 @@ class Trajectory:
         return self._file_sha256 or hashlib.sha256(npz_bytes(_arrays(self))).hexdigest()
 
     def sampled(self, times: Array) -> tuple[Array, Array]:
-        """Joint positions and rates at other times, (..., n) each, by cubic Hermite interpolation of q, qd.
-
-        Before the first and after the last sample the motion rests there.
+        """Joint positions and rates at other times, by cubic Hermite interpolation of q and qd.
 
         Args:
-            times: (...,) [s].
+            times: (...,) [s]. Before the first and after the last sample the motion rests there.
 
         Returns:
             q (..., n) [rad or m], and qd (..., n) per second.
         """
-        return _hermite(self.time, self.q, self.qd, np.asarray(times, dtype=float))
+        return hermite(self.time, self.q, self.qd, np.asarray(times, dtype=float))
 
     def base_sampled(self, times: Array) -> Array:
-        """Planned base poses at other times, (..., 4, 4).
+        """Planned base poses (..., 4, 4) at other times (...,) [s].
 
         The origin moves on the cubic Hermite spline of its positions and velocities, the orientation turns
         evenly from sample to sample.
-
-        Args:
-            times: (...,) [s].
         """
         times = np.asarray(times, dtype=float)
         T = np.zeros((*times.shape, 4, 4))
         T[..., 3, 3] = 1.0
-        T[..., :3, 3] = _hermite(self.time, self.T_world_base[:, :3, 3], self.base_twist[:, 3:], times)[0]
-        i, u, _ = _places(self.time, times)
+        T[..., :3, 3] = hermite(self.time, self.T_world_base[:, :3, 3], self.base_twist[:, 3:], times)[0]
+        i, u, _ = places(self.time, times)
         before = rotation_from_array(self.T_world_base[i, :3, :3])
         turned = rotation_log(before.T @ rotation_from_array(self.T_world_base[i + 1, :3, :3]))
         T[..., :3, :3] = as_array(before @ rotation_exp(turned * u))
@@ -190,7 +186,10 @@ class Trajectory:
                 binary.write(npz_bytes(_arrays(self)))
         elif path.suffix in (".csv", ".json"):
             with atomic_write(path) as text:
-                text.write(_csv_text(self) if path.suffix == ".csv" else _ros_text(self))
+                joints = self.time, self.joint_names, self.q
+                text.write(
+                    csv_text(*joints) if path.suffix == ".csv" else ros_text(*joints, self.qd, self.qdd)
+                )
         else:
             raise TrajectoryError(f"{path}: unknown suffix {path.suffix!r}; use .npz, .csv or .json")
         return path
@@ -202,9 +201,19 @@ def load_trajectory(path: str | Path) -> Trajectory:
     Args:
         path: of the file.
 
+    Returns:
+        The motion with everything that the file holds, arrays read-only.
+
     Raises:
         InputError: not a path.
         TrajectoryError: not there, truncated, foreign, incomplete, inconsistent, or holding pickles.
+
+    Example:
+        >>> import screwkin as sk
+        >>> robot = sk.load_robot(sk.robot_names()[0])
+        >>> path = sk.walk(robot, sk.load_gait("walk"), steps=1).save("walk.npz")
+        >>> sk.load_trajectory(path).joint_names == robot.joint_names
+        True
     """
     expect(path, (str, Path), "path", "the path of an .npz file")
     path = Path(path)
@@ -219,6 +228,12 @@ def load_trajectory(path: str | Path) -> Trajectory:
     except InputError as error:
         raise TrajectoryError(f"{path}: {error}") from None
     object.__setattr__(trajectory, "_file_sha256", hashlib.sha256(data).hexdigest())
+    return trajectory
+
+
+def _restored(values: Mapping[str, Any], file_sha256: str) -> Trajectory:
+    trajectory = Trajectory(**values)
+    object.__setattr__(trajectory, "_file_sha256", file_sha256)
     return trajectory
 
 
@@ -245,12 +260,6 @@ def check_joints(robot: Robot, joint_names: Sequence[str], what: str = "the traj
     )
 
 
-def _restored(values: Mapping[str, Any], file_sha256: str) -> Trajectory:
-    trajectory = Trajectory(**values)
-    object.__setattr__(trajectory, "_file_sha256", file_sha256)
-    return trajectory
-
-
 def sha256_of(path: str | Path) -> str:
     """SHA-256 of a file's bytes, in hexadecimal.
 
@@ -261,26 +270,6 @@ def sha256_of(path: str | Path) -> str:
         return hashlib.sha256(Path(path).read_bytes()).hexdigest()
     except OSError as error:
         raise TrajectoryError(f"{path}: cannot be read: {error.strerror}") from None
-
-
-def _places(knots: Array, times: Array) -> tuple[NDArray[np.intp], Array, Array]:
-    """For every time: index of the knot before it, how far it is towards the next (0 to 1), and their gap."""
-    inside = np.clip(times, knots[0], knots[-1])
-    i = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, len(knots) - 2)
-    gap = knots[i + 1] - knots[i]
-    return i, (inside - knots[i]) / gap, gap
-
-
-def _hermite(knots: Array, values: Array, rates: Array, times: Array) -> tuple[Array, Array]:
-    """Cubic Hermite spline and its derivative; at rest before the first knot and after the last."""
-    i, u, gap = _places(knots, times)
-    u, h = u[..., None], gap[..., None]
-    a, b, rise = h * rates[i], h * rates[i + 1], values[i + 1] - values[i]
-    square, cube = 3 * rise - 2 * a - b, a + b - 2 * rise
-    value = values[i] + u * (a + u * (square + u * cube))
-    rate = (a + u * (2 * square + 3 * u * cube)) / h
-    moving = (times >= knots[0]) & (times <= knots[-1])
-    return value, np.where(moving[..., None], rate, 0.0)
 
 
 def _numbers(name: str, value: Any, shape: tuple[int, ...], faults: list[str]) -> Array:
@@ -387,37 +376,3 @@ def _from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Trajectory:
     if not isinstance(rest["meta"], dict):
         raise TrajectoryError("meta is not the text of a JSON object")
     return Trajectory(T_world_tip=tips, **rest)
-
-
-def _csv_text(trajectory: Trajectory) -> str:
-    """Time [s], then one column per joint [rad or m], with every digit that distinguishes a float."""
-    rows = [",".join(("time", *trajectory.joint_names))]
-    rows += [
-        ",".join(map(repr, (t, *q)))
-        for t, q in zip(trajectory.time.tolist(), trajectory.q.tolist(), strict=True)
-    ]
-    return "\n".join(rows) + "\n"
-
-
-def _ros_text(trajectory: Trajectory) -> str:
-    """The message trajectory_msgs/JointTrajectory, times counted from its first sample."""
-
-    def stamp(seconds: float) -> dict[str, int]:
-        whole, nano = divmod(round(seconds * 1e9), 10**9)
-        return {"sec": whole, "nanosec": nano}
-
-    columns = (a.tolist() for a in (trajectory.time, trajectory.q, trajectory.qd, trajectory.qdd))
-    start = float(trajectory.time[0])
-    points = [
-        {
-            "positions": q,
-            "velocities": qd,
-            "accelerations": qdd,
-            "effort": [],
-            "time_from_start": stamp(t - start),
-        }
-        for t, q, qd, qdd in zip(*columns, strict=True)
-    ]
-    header = {"stamp": stamp(0.0), "frame_id": ""}
-    names = list(trajectory.joint_names)
-    return json.dumps({"header": header, "joint_names": names, "points": points}) + "\n"

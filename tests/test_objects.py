@@ -50,7 +50,8 @@ def assert_same(a: Any, b: Any) -> None:
     assert type(a) is type(b)
     if hasattr(a, "__dataclass_fields__"):
         for f in fields(a):
-            assert_same(getattr(a, f.name), getattr(b, f.name))
+            if f.init:
+                assert_same(getattr(a, f.name), getattr(b, f.name))
     elif isinstance(a, np.ndarray):
         np.testing.assert_array_equal(a, b)
     elif hasattr(a, "items"):

@@ -12,6 +12,7 @@ from screwkin.algebra.screws import at
 from screwkin.algebra.se3 import Pose, as_array, pose_from_array, rotation_log, unstack
 from screwkin.errors import LimitError, UnreachableError
 from screwkin.gait.plan import Plan
+from screwkin.ik.pose import solve_pose
 from screwkin.ik.pose_solution import PoseSolution
 from screwkin.kinematics.landmarks import limb_root, waist_frame
 from screwkin.kinematics.positions import (

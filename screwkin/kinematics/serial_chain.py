@@ -7,7 +7,7 @@ a table names means nothing: every axis is given by its point nearest to the nex
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import wraps
 from itertools import pairwise
 from typing import Any, Concatenate, ParamSpec, TypeVar
@@ -68,6 +68,10 @@ class SerialChain:
     turning: Array
     length: float
     memo: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False)
+
+    def __reduce__(self) -> Any:
+        """For pickles and copies: without what is cached."""
+        return SerialChain, tuple(getattr(self, f.name) for f in fields(self) if f.init)
 
     @classmethod
     def of(cls, robot: Robot, limb: str) -> SerialChain:

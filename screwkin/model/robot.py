@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any, Self
 
 from screwkin.algebra.scalar import Scalar, is_symbolic
-from screwkin.algebra.se3 import UNTURNED, Pose, Vector, leaves
+from screwkin.algebra.se3 import UNTURNED, Pose, Vector
 from screwkin.errors import InputError, UnknownNameError, expect
 from screwkin.model.changes import changed_text, check_followed
 from screwkin.model.display import figure, html_table, listing
@@ -26,7 +26,7 @@ from screwkin.model.records import (
     Posture,
     RobotRecord,
     Sole,
-    is_open,
+    open_scalars,
     same_content,
 )
 from screwkin.model.sound import are_inertias
@@ -109,7 +109,7 @@ class Robot(RobotRecord):
         for what, wanted in wishes.items():
             expect(wanted, Mapping, what, "values by the name of their link or joint")
         text = changed_text(self, robot_text(self), name, parameters, wishes)
-        robot = self.from_text(text, f"<{self.name}, changed>", self._is_symbolic)
+        robot = self.from_text(text, f"<{self.name}, changed>", self.is_symbolic)
         check_followed(robot, wishes)
         return robot
 
@@ -117,13 +117,14 @@ class Robot(RobotRecord):
     def text_matches(self) -> bool:
         """Whether ``text`` is a table of exactly this robot; ``dataclasses.replace`` leaves it behind."""
         try:
-            return bool(self.text) and same_content(self, read_table(self.text, self.path, self._is_symbolic))
+            return bool(self.text) and same_content(self, read_table(self.text, self.path, self.is_symbolic))
         except InputError:
             return False
 
-    @property
-    def _is_symbolic(self) -> bool:
-        return any(is_open(x) for x in self.parameters.values())
+    @cached_property
+    def is_symbolic(self) -> bool:
+        """True if any number is a symbol, as in the symbolic twin of a table."""
+        return any(is_symbolic(x) for x in open_scalars(self))
 
     def __getstate__(self) -> dict[str, Any]:
         """The fields, for pickles and copies, without what is cached beside them."""
@@ -177,14 +178,6 @@ class Robot(RobotRecord):
     def mass(self) -> Scalar:
         """Total mass [kg]."""
         return sum(link.mass for link in self.links)
-
-    @cached_property
-    def is_symbolic(self) -> bool:
-        """True if any number is a symbol, as in the symbolic twin of a table."""
-        records: list[Any] = [x for link in self.links for x in (link.com, link.inertia, link.frame)]
-        records += [x for joint in self.joints for x in (joint.screw.s, joint.screw.s0, joint.screw.pitch)]
-        records += [limb.frame for limb in self.limbs] + [link.mass for link in self.links]
-        return any(is_symbolic(leaf) for record in records for leaf in leaves(record))
 
     @cached_property
     def joint_above(self) -> Mapping[str, int]:
