@@ -42,7 +42,7 @@ def test_the_folder_holds_trajectory_verdict_film_and_report(shown):
     assert {"trajectory.npz", "trajectory.csv", "validation.json", "walk.gif", "report.html"} <= names
     assert not [name for name in names if name.startswith(".")]
     assert {"play.npz", "tracking.png"} <= names
-    assert "What the servos were told" in (folder / "report.html").read_text(encoding="utf-8")
+    assert "What was commanded to the servos" in (folder / "report.html").read_text(encoding="utf-8")
     assert json.loads((folder / "validation.json").read_text(encoding="utf-8"))["passed"]
 
 
