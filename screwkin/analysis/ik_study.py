@@ -127,7 +127,7 @@ def ik_study(
 
 def fitting_entries(chain: SerialChain, cap: int) -> list[Entry]:
     """The methods that fit a limb, from the best informed to the plainest."""
-    base = IkSettings(position_tolerance=1e-6, rotation_tolerance=1e-6, max_iterations=cap)
+    base = IkSettings(position_tolerance=1e-6, rotation_tolerance=1e-6, max_iterations=cap, starts=1)
     soft = replace(base, damping=0.055)
     cold, seed = "from q = 0", "from the spherical variant"
     entries = []

@@ -206,7 +206,7 @@ def _found(chain: SerialChain, points: Array, guess: Array, length: float) -> tu
     target = np.tile(as_array(chain.tip).astype(float), (count, 1, 1))
     target[:, :3, 3] = points
     start = np.tile(guess, (count, 1))
-    found = solve_limb(chain, target, "auto", start, IkSettings(), (count,), nearest=False)
+    found = solve_limb(chain, target, "auto", start, IkSettings(starts=1), (count,), nearest=False)
     cause = _causes(chain, found)
     good = cause == REACHABLE
     inverse = np.full(count, np.nan)

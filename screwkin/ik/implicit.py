@@ -63,7 +63,9 @@ def limb_in_jax(
     empty = solve(*(np.zeros((0, *shape)) for shape in shapes))
     examples = [getattr(empty, name) for name in LIMB]
     outputs = _called(values, examples, rates, inner)(*_broadcast((target, guess), shapes, batch))
-    return LimbSolutions(chain.limb, chain.names, empty.method, **dict(zip(LIMB, outputs, strict=True)), chain=chain)
+    return LimbSolutions(
+        chain.limb, chain.names, empty.method, **dict(zip(LIMB, outputs, strict=True)), chain=chain
+    )
 
 
 def pose_in_jax(
