@@ -18,7 +18,7 @@ from screwkin.analysis.ik_targets import path_notes, random_targets, walking_pat
 from screwkin.errors import InputError
 from screwkin.ik.closed import closed_form
 from screwkin.ik.hybrid import spherical_variant
-from screwkin.ik.limb import Method, solve_limb
+from screwkin.ik.methods import Method, solve_limb
 from screwkin.ik.numeric import IkSettings
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.model.robot import Robot

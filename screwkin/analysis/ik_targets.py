@@ -8,7 +8,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, unstack
 from screwkin.analysis.foot_path import FootPath, foot_from_waist
 from screwkin.errors import InputError, UnreachableError
-from screwkin.ik.limb import solve_limb
+from screwkin.ik.methods import solve_limb
 from screwkin.ik.numeric import IkSettings
 from screwkin.kinematics.serial_chain import SerialChain, forward
 

@@ -20,8 +20,8 @@ from screwkin.algebra.se3 import as_array, cross, dot, norm
 from screwkin.compiler.run import run
 from screwkin.errors import InputError
 from screwkin.ik.closed import recognised
-from screwkin.ik.limb import solve_limb
 from screwkin.ik.limb_map import limb_map
+from screwkin.ik.methods import solve_limb
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.solutions import LimbSolutions
 from screwkin.kinematics.serial_chain import SerialChain, residual

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from screwkin.errors import InputError
-from screwkin.ik.limb import solve_limb
+from screwkin.ik.methods import solve_limb
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.solutions import BEYOND, LimbSolutions, ordered
 from screwkin.kinematics.serial_chain import SerialChain

@@ -1,4 +1,4 @@
-"""Inverse kinematics in JAX: arrays of its kind, transformations, and derivatives of the implicit function."""
+"""Inverse kinematics in JAX: arrays of its kind, transformations, and implicit derivatives."""
 
 from __future__ import annotations
 

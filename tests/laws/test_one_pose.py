@@ -46,13 +46,13 @@ def test_a_pose_is_solved_alike_alone_and_in_any_batch(name: str) -> None:
     assert_one_answer(robot, inside(robot, 105, 1), (1, 7, 101))
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [1, pytest.param(0, marks=pytest.mark.slow)])
 def test_poses_of_random_robots_are_solved_alike_alone_and_in_any_batch(seed: int) -> None:
     robot = random_robot(seed)
     assert_one_answer(robot, inside(robot, 6, seed), (1, 5))
 
 
-@pytest.mark.parametrize("name", ["bioloid", "poppy12"])
+@pytest.mark.parametrize("name", ["bioloid", pytest.param("poppy12", marks=pytest.mark.slow)])
 def test_a_prepared_robot_gives_the_same_answers(name: str) -> None:
     robot = fresh(name)
     q = inside(robot, 300, 2)
