@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from screwkin.ik.whole_body import closed_targets
 
 import screwkin as sk
 from benchmarks import workloads
@@ -30,6 +29,8 @@ from screwkin.compiler.records import identifier
 from screwkin.compiler.run import run
 from screwkin.dynamics import quantities
 from screwkin.ik import programs as limbs
+from screwkin.ik.closed import recognised
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.tip_motion import motion_program
 from screwkin.model.robot import Robot
 
@@ -76,12 +77,14 @@ def inputs(robot: Robot, count: int) -> Iterator[tuple[Program, dict[str, Array]
     reach = workloads.random_reach(robot, count)
     guess = np.broadcast_to(reach.guess, (count, len(reach.guess)))
     yield limbs.limb_nearest(robot, reach.limb.name), {"T_base_tip": reach.target, "guess": guess}
-    targets = {limb.tip: sk.frame_pose(robot, sk.State(**state), limb.tip) for limb in robot.limbs}
-    targets |= {limb.tip: targets[limb.tip][:, :3, 3] for limb in robot.limbs if limb.kind != "leg"}
-    if told := closed_targets(robot, targets):
-        wanted = {identifier("target", tip): x for tip, x in targets.items()}
-        home = np.broadcast_to(sk.home(robot).q, given.q.shape)
-        yield limbs.whole_body(robot, told), {"T_world_base": given.T_world_base, "guess": home, **wanted}
+    home = sk.home(robot).q
+    for chain in (SerialChain.of(robot, limb.name) for limb in robot.limbs):
+        pose = len(chain.joints) == 6
+        if recognised(chain, not pose):
+            target = sk.frame_pose(robot, sk.State(**state), robot.limb(chain.limb).tip)
+            own = np.broadcast_to(home[list(chain.joints)], (count, len(chain.joints)))
+            wanted = {"target": target if pose else target[:, :3, 3], "guess": own}
+            yield limbs.limb_pose(chain, not pose), {"T_world_base": given.T_world_base, **wanted}
 
 
 def measured(

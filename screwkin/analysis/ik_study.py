@@ -18,7 +18,7 @@ from screwkin.analysis.ik_targets import path_notes, random_targets, walking_pat
 from screwkin.errors import InputError
 from screwkin.ik.closed import closed_form
 from screwkin.ik.hybrid import spherical_variant
-from screwkin.ik.limb import Method, solve_limb
+from screwkin.ik.methods import Method, solve_limb
 from screwkin.ik.numeric import IkSettings
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.model.robot import Robot
@@ -127,7 +127,7 @@ def ik_study(
 
 def fitting_entries(chain: SerialChain, cap: int) -> list[Entry]:
     """The methods that fit a limb, from the best informed to the plainest."""
-    base = IkSettings(position_tolerance=1e-6, rotation_tolerance=1e-6, max_iterations=cap)
+    base = IkSettings(position_tolerance=1e-6, rotation_tolerance=1e-6, max_iterations=cap, starts=1)
     soft = replace(base, damping=0.055)
     cold, seed = "from q = 0", "from the spherical variant"
     entries = []

@@ -8,7 +8,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, unstack
 from screwkin.analysis.foot_path import FootPath, foot_from_waist
 from screwkin.errors import InputError, UnreachableError
-from screwkin.ik.limb import solve_limb
+from screwkin.ik.methods import solve_limb
 from screwkin.ik.numeric import IkSettings
 from screwkin.kinematics.serial_chain import SerialChain, forward
 
@@ -57,7 +57,9 @@ def walking_path(chain: SerialChain, waist: float | None = None) -> FootPath:
         path = FootPath(abs(lateral), height, STEP * height, LIFT * height)
         target = walking_targets(chain, path)
         bent = np.full((len(target), len(chain.names)), 0.1)
-        reached = solve_limb(chain, target, "auto", bent, IkSettings(), (len(target),), False).valid.any(1)
+        reached = solve_limb(
+            chain, target, "auto", bent, IkSettings(starts=1), (len(target),), False
+        ).valid.any(1)
         if reached.all():
             return path
     sample = int(np.argmin(reached))

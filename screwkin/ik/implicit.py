@@ -18,8 +18,8 @@ from screwkin.algebra.pattern import components
 from screwkin.algebra.pytrees import register_with_jax
 from screwkin.algebra.screws import at
 from screwkin.algebra.se3 import as_array, unstack
-from screwkin.ik import limb as limbs
-from screwkin.ik import pose as poses
+from screwkin.ik import methods as limbs
+from screwkin.ik import whole_body as poses
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.pose_solution import PoseSolution
 from screwkin.ik.solutions import LimbSolutions

@@ -16,7 +16,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.newton import newton, solved
 from screwkin.errors import InputError
-from screwkin.ik.system import System
+from screwkin.ik.system import Bounded, System
 
 Numeric = Literal["newton", "lm", "dls", "pinv"]
 
@@ -24,8 +24,10 @@ CUT = 1e-15
 """Singular values below this share of the largest are dropped by the pseudoinverse: hardly any is."""
 BEND = 0.3
 """How far the second start is from the guess [rad]: it leaves the saddle of a straight limb."""
-HOPELESS = 8
+HOPELESS = 12
 """Starts after which a sample that has arrived from none of them is given up."""
+PLAIN = 3
+"""Every third start iterates as the first does; the others never leave the limits."""
 LATER = 100
 """Bound on the steps from every start but the first: most that arrive do so in 20."""
 BETTER = 0.99
@@ -104,7 +106,7 @@ def solve_system(system: System, method: Numeric, guess: Array, settings: IkSett
         at = np.flatnonzero(best.rank == 1 if k >= HOPELESS else best.rank > 0)
         if not len(at):
             break
-        end = _ended(system.part(at), method, start(system, guess[at], k), later)
+        end = _ended(system.part(at), method, start(system, guess[at], k), later, k % PLAIN != 0)
         better = end.rank < best.rank[at]
         nearer = _far(system, end.x, guess[at]) < _far(system, best.x[at], guess[at])
         better |= (end.rank == 1) & (best.rank[at] == 1) & nearer
@@ -150,9 +152,16 @@ def arrived(system: System, lack: Array, settings: IkSettings) -> Array:
     return good
 
 
-def _ended(system: System, method: Numeric, start: Array, settings: IkSettings) -> _Ends:
+def _ended(
+    system: System, method: Numeric, start: Array, settings: IkSettings, bounded: bool = False
+) -> _Ends:
     """Iterations from one start, their end put inside the limits where the tolerances allow it."""
-    x, iterations = _METHODS[method](system, start, settings)
+    if bounded:
+        inside = Bounded(system.chains, system.targets)
+        u, iterations = _METHODS[method](inside, system.variables(start), settings)
+        x = system.inner(u)[0]
+    else:
+        x, iterations = _METHODS[method](system, start, settings)
     x = system.wrapped(x)
     everyone = np.arange(len(x))
     lack, _ = system.residual(x, everyone)

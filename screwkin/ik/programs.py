@@ -17,6 +17,7 @@ from screwkin.compiler.program import Program, Recorder
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.ik.closed import EXACT, recognised
 from screwkin.kinematics.limits import CUT, LIMIT_TOLERANCE, TURN, beyond, turn_within
+from screwkin.kinematics.rigid import poses
 from screwkin.kinematics.serial_chain import SerialChain, cached, miss
 from screwkin.kinematics.status import SINGULAR
 from screwkin.mechanism.limb_motion import seen_screws
@@ -247,3 +248,10 @@ def limb_programs(chain: SerialChain) -> list[Program]:
     """The programs of a limb's closed forms: what ``limb_ik`` and ``solve_pose`` run for it."""
     kinds = [position for position in (False, True) if recognised(chain, position)]
     return [make(chain, position) for position in kinds for make in (limb_branches, limb_pose)]
+
+
+def programs_of(robot: Robot) -> list[Program]:
+    """The programs worth preparing for inverse kinematics: of every limb that has a closed form."""
+    limbs = [] if robot.closures else [SerialChain.of(robot, limb.name) for limb in robot.limbs]
+    programs = [program for chain in limbs for program in limb_programs(chain)]
+    return [*programs, poses(True)] if programs else []

@@ -15,8 +15,8 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array
 from screwkin.compiler.run import run
 from screwkin.ik.closed import recognised
-from screwkin.ik.limb import solve_limb
 from screwkin.ik.limb_map import NEAR, limb_map
+from screwkin.ik.methods import solve_limb
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.solutions import LimbSolutions
 from screwkin.kinematics.limits import beyond

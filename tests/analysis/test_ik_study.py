@@ -13,7 +13,7 @@ from screwkin.analysis.foot_path import FootPath, foot_from_waist
 from screwkin.analysis.ik_study import IkRow, fitting_entries, ik_study, measured
 from screwkin.analysis.ik_targets import random_targets, walking_path, walking_targets
 from screwkin.errors import InputError, UnknownNameError, UnreachableError
-from screwkin.ik.limb import solve_limb
+from screwkin.ik.methods import solve_limb
 from screwkin.ik.numeric import IkSettings
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.model.table import load_robot

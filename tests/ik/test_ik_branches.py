@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from screwkin.errors import InputError
-from screwkin.ik.limb import solve_limb
+from screwkin.ik.methods import solve_limb
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.solutions import BEYOND, LimbSolutions, ordered
 from screwkin.kinematics.serial_chain import SerialChain
@@ -120,3 +120,28 @@ def test_an_angle_is_given_by_the_turn_that_its_limits_ask_for() -> None:
     turn = 2 * np.pi
     np.testing.assert_allclose(q, [[turn - 1.0, 4.0, 7.0 - turn, 2 * turn - 7.0, np.pi, np.pi]])
     assert chain.within(q).all()
+
+
+@pytest.mark.parametrize("start", [None, 0.0])
+def test_a_path_unwraps_joints_that_may_turn_beyond_half_a_turn(start: float | None) -> None:
+    """A hip yaw that turns once and a half: its angles jump, the path does not, and it keeps its limits."""
+    t = np.linspace(0.0, 1.0, 400)
+    q = np.tile([0.0, 0.1, -0.5, 1.0, -0.4, 0.1], (400, 1))
+    q[:, 0] = 3.0 * np.pi * t - 1.0
+    leg, chain = spherical_leg(), spherical_leg().chain(10.0)
+    found = solve_limb(chain, leg.reach(q), "closed", np.zeros_like(q), IkSettings(), (400,))
+    path = found.path(None if start is None else q[0])
+    assert np.abs(np.diff(path, axis=0)).max() < 0.1
+    np.testing.assert_allclose(path[:, 0] - path[0, 0], q[:, 0] - q[0, 0], atol=1e-6)
+    assert (np.abs(path) <= 10.0).all()
+
+
+def test_a_path_turns_back_where_the_limits_end() -> None:
+    """Within 200 degrees a yaw of one turn and a half cannot be followed smoothly: it turns back once."""
+    q = np.tile([0.0, 0.1, -0.5, 1.0, -0.4, 0.1], (400, 1))
+    q[:, 0] = np.linspace(-1.0, 3.0 * np.pi - 1.0, 400)
+    leg, limit = spherical_leg(), np.radians(200)
+    found = solve_limb(leg.chain(limit), leg.reach(q), "closed", np.zeros_like(q), IkSettings(), (400,))
+    path = found.path(q[0])
+    assert (np.abs(path[:, 0]) <= limit + 1e-9).all()
+    assert (np.abs(np.diff(path[:, 0])) > 1.0).sum() <= 2

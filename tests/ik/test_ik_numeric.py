@@ -9,7 +9,7 @@ import pytest
 
 from screwkin.errors import InputError
 from screwkin.ik.hybrid import hybrid_seed, spherical_variant
-from screwkin.ik.limb import Method, solve_limb
+from screwkin.ik.methods import Method, solve_limb
 from screwkin.ik.numeric import IkSettings
 from screwkin.kinematics.axis_geometry import meeting
 from screwkin.kinematics.serial_chain import SerialChain, residual

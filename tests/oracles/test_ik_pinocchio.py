@@ -8,7 +8,7 @@ import pytest
 from screwkin.algebra.se3 import as_array
 from screwkin.analysis.ik_others import pinocchio_clik, pinocchio_model
 from screwkin.analysis.ik_targets import random_targets, walking_path, walking_targets
-from screwkin.ik.limb import solve_limb
+from screwkin.ik.methods import solve_limb
 from screwkin.ik.numeric import IkSettings
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.model.table import load_robot
