@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from screwkin.ik.whole_body import closed_targets
 
 import screwkin as sk
 from benchmarks import workloads
@@ -29,8 +30,7 @@ from screwkin.compiler.records import identifier
 from screwkin.compiler.run import run
 from screwkin.dynamics import quantities
 from screwkin.ik import programs as limbs
-from screwkin.ik.whole_body import closed_targets
-from screwkin.mechanism.tip_motion import motion
+from screwkin.mechanism.tip_motion import motion_program
 from screwkin.model.robot import Robot
 
 Array = Any
@@ -69,7 +69,7 @@ def inputs(robot: Robot, count: int) -> Iterator[tuple[Program, dict[str, Array]
     rng, given = np.random.default_rng(2), workloads.motion(robot, count)
     state = {"T_world_base": given.T_world_base, "q": given.q}
     rates = {"base_twist": given.waist, **{identifier("twist", tip): x for tip, x in given.tips.items()}}
-    yield motion.program(robot), state | rates
+    yield motion_program(robot), state | rates
     second = {"qd": rng.uniform(-1, 1, given.q.shape), "qdd": rng.uniform(-1, 1, given.q.shape)}
     second |= {"base_twist": given.waist, "base_acceleration": rng.uniform(-1, 1, (count, 6))}
     yield quantities.balance.program(robot), state | second

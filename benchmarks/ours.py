@@ -21,7 +21,7 @@ from screwkin.compiler.run import run as kernel
 from screwkin.dynamics import quantities
 from screwkin.gait.balance import ground_reaction
 from screwkin.ik import programs as limbs
-from screwkin.mechanism.tip_motion import motion
+from screwkin.mechanism.tip_motion import motion_program
 from screwkin.model.robot import Robot
 
 Array = Any
@@ -54,7 +54,7 @@ def _warm(run: Callable[[], T]) -> Callable[[], T]:
 
 def _rate_kernels(robot: Robot, given: Motion) -> Contestants:
     """The same by the compiled program, on every path that this computer has."""
-    program = motion.program(robot)
+    program = motion_program(robot)
     told = {"T_world_base": given.T_world_base, "q": given.q, "base_twist": given.waist}
     told |= {identifier("twist", tip): values for tip, values in given.tips.items()}
     count = len(given.q)

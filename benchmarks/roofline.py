@@ -116,12 +116,12 @@ def bounds(robot: Any) -> list[Bound]:
     from screwkin.dynamics import quantities
     from screwkin.ik import programs as limbs
     from screwkin.kinematics import body
-    from screwkin.mechanism.tip_motion import motion
+    from screwkin.mechanism.tip_motion import motion_program
 
     limb = next(limb.name for limb in robot.limbs if limb.kind == "leg")
     programs = [
         body.tip_poses.program(robot),
-        motion.program(robot),
+        motion_program(robot),
         quantities.balance.program(robot),
         limbs.limb_nearest(robot, limb),
     ]

@@ -27,3 +27,14 @@ def test_links_between_pages_and_pictures_lead_somewhere(page: str) -> None:
     links = re.findall(r"\]\(([^)#\s]+)[^)]*\)", text)
     missing = [link for link in links if "://" not in link and not ((ROOT / page).parent / link).exists()]
     assert not missing
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_the_first_two_commands_of_the_readme_each_stand_on_their_own(number: int) -> None:
+    """In a fresh clone: they make the environment that they use. The second one is what ``.ci/run`` runs."""
+    blocks = re.findall(r"```sh\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+    make, install, *use = blocks[number].strip().split(" && ")
+    assert make == "python3.11 -m venv .venv"
+    assert install.startswith(".venv/bin/pip install -e ")
+    assert use
+    assert all(one.startswith(".venv/bin/") for one in use)

@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+import importlib
+import sys
 from typing import Any
 
 import numpy as np
 
 Array = np.ndarray[Any, np.dtype[Any]]
 """An array of any shape, float64 unless a docstring says otherwise."""
+
+
+def numpy_of(*arrays: object) -> Any:
+    """The module that computes with such arrays: ``jax.numpy`` if one is a JAX array, else ``numpy``."""
+    jax = sys.modules.get("jax")
+    if jax is None or not any(isinstance(array, jax.Array) for array in arrays):
+        return np
+    return importlib.import_module("jax.numpy")

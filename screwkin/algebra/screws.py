@@ -17,6 +17,9 @@ from screwkin.errors import InputError
 INFINITE = math.inf
 """Pitch of a pure translation."""
 
+_ALIGNED = 2.0**-50
+"""A component of a unit vector this near to 0 or 1 [1] is one: the rounding of a few products."""
+
 
 @record
 class Screw:
@@ -83,15 +86,23 @@ def displacement(screw: Screw, theta: Scalar) -> Pose:
 
 @record
 class Displacement:
-    """A rigid displacement told by its rotation and by where it takes one point: ``seen`` goes to ``now``.
+    """A rigid displacement by its rotation and by where it takes one point: ``seen`` goes to ``now``.
 
     It serves wherever a ``Pose`` does. With the points on the axes, a product of screw displacements costs
-    what one of joint frames does: the way from axis to axis is a constant with few components.
+    what one of joint frames does: the way from axis to axis is a constant with few components. The rotation
+    is ``outer @ inner``: behind a skew axis, ``inner`` is the constant turn that a joint frame would hold.
     """
 
-    R: Rotation
+    outer: Rotation
     seen: Vector
     now: Vector
+    inner: Rotation = UNTURNED
+
+    @property
+    def R(self) -> Rotation:
+        """The rotation."""
+        turned: Rotation = self.outer if self.inner is UNTURNED else self.outer @ self.inner
+        return turned
 
     @property
     def p(self) -> Vector:
@@ -100,8 +111,8 @@ class Displacement:
 
     def __matmul__(self, other: Any) -> Any:
         if isinstance(other, Vector):
-            return self.now + self.R @ (other - self.seen)
-        return Pose(self.R @ other.R, self @ other.p)
+            return self.now + self.outer @ (self.inner @ (other - self.seen))
+        return Pose(self.outer @ (self.inner @ other.R), self @ other.p)
 
     @property
     def inverse(self) -> Displacement:
@@ -114,16 +125,38 @@ AT_REST = Displacement(UNTURNED, ZERO, ZERO)
 
 def advance(before: Displacement, screw: Screw, theta: Scalar) -> Displacement:
     """The displacement ``before``, after the screw's own: what the next body of a chain undergoes (eq. 3)."""
-    now = before @ screw.s0
+    s = before.inner @ screw.s
+    now, axis = before @ screw.s0, before.outer @ s
     if screw.is_translation:
-        return Displacement(before.R, screw.s0, now + before.R @ (screw.s * theta))
-    slide = screw.s * times(screw.pitch, theta)
-    return Displacement(before.R @ rotate(screw.s, theta), screw.s0, now + before.R @ slide)
+        return Displacement(before.outer, screw.s0, now + axis * theta, before.inner)
+    now = now + axis * times(screw.pitch, theta)
+    onto, along = _aligned(s)
+    inner = before.inner if onto is UNTURNED else onto.T @ before.inner
+    return Displacement(before.outer @ onto @ rotate(along, theta), screw.s0, now, inner)
+
+
+def _aligned(s: Vector) -> tuple[Rotation, Vector]:
+    """A constant turn, and the direction that it takes onto s: a coordinate axis, if s lies skew in a plane.
+
+    Two turns about coordinate axes take fewer operations than one about a skew line.
+    """
+    if not all(isinstance(component, int | float) for component in s):
+        return UNTURNED, s
+    x, y, z = (round(c) if abs(c - round(c)) < _ALIGNED else c for c in s)
+    match (x == 0, y == 0, z == 0):
+        case (True, False, False):
+            return Rotation(Vector(1, 0, 0), Vector(0, z, -y), Vector(0, y, z)), Vector(0, 0, 1)
+        case (False, True, False):
+            return Rotation(Vector(z, 0, -x), Vector(0, 1, 0), Vector(x, 0, z)), Vector(0, 0, 1)
+        case (False, False, True):
+            return Rotation(Vector(x, y, 0), Vector(-y, x, 0), Vector(0, 0, 1)), Vector(1, 0, 0)
+    return UNTURNED, Vector(x, y, z)
 
 
 def carry(pose: Pose | Displacement, screw: Screw) -> Screw:
     """The screw where the pose takes it."""
-    return Screw(pose.R @ screw.s, pose @ screw.s0, screw.pitch)
+    s = pose.outer @ (pose.inner @ screw.s) if isinstance(pose, Displacement) else pose.R @ screw.s
+    return Screw(s, pose @ screw.s0, screw.pitch)
 
 
 def transport(pose: Pose, twist: Twist) -> Twist:

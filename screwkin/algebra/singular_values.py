@@ -176,7 +176,8 @@ def _outermost(sums: Sequence[Scalar], side: int) -> tuple[Scalar, Scalar]:
         step = _laguerre(value, slope, bend, n, sign)
         y = last - step
     size = _taylor(powers, abs_(last))[0]
-    inverse = _inverse(last * slope)
+    scale = last * slope
+    inverse = 1 / where(abs_(scale) > 0, scale, 1.0)  # a root that is exactly 0 has no error
     gap, change = abs_(size * inverse), abs_(step * slope * inverse)
     near = change * gap
     return -y, plus(change * least(near * near, 1.0), gap * ROUNDING)

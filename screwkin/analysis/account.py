@@ -1,4 +1,4 @@
-"""All there is to tell about a trajectory: its balance, closure, singularity, and use of its servos."""
+"""All that is reported about a trajectory: its balance, closure, singularity, and use of its servos."""
 
 from __future__ import annotations
 
@@ -17,15 +17,16 @@ from screwkin.gait.intended import intended
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.kinematics.status import SINGULAR
 from screwkin.mechanism.choice import closed_mechanism
-from screwkin.mechanism.network import coupling_twists, network_matrix
-from screwkin.mechanism.rates import block_name, singular_values
+from screwkin.mechanism.least_values import least_values
+from screwkin.mechanism.rates import block_names
 from screwkin.mechanism.singularity import LimbSingularity, singularity_report
 from screwkin.model.robot import Robot
+from screwkin.model.state import State
 from screwkin.model.table import parse_robot
 from screwkin.trajectory import Trajectory
 
 _SAME_ZMP = 1e-6  # m: what other versions' rounding may change
-_COARSE = 0.1  # s between samples: a step of a second would be told by ten
+_COARSE = 0.1  # s between samples: a step of a second would have ten
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,18 +49,18 @@ class Account:
         T = pose_from_array(self.trajectory.T_world_base)
         D = link_displacements(self.robot, unstack(self.motion.q))
         errors = {}
-        for tip, told in self.trajectory.T_world_tip.items():
+        for tip, recorded in self.trajectory.T_world_tip.items():
             reached = as_array(T @ frame_pose(self.robot, D, tip), (self.trajectory.samples,))
-            gap = float(np.linalg.norm(reached[:, :3, 3] - told[:, :3, 3], axis=1).max())
-            errors[tip] = (gap, float(_angle(reached[:, :3, :3], told[:, :3, :3]).max()))
+            gap = float(np.linalg.norm(reached[:, :3, 3] - recorded[:, :3, 3], axis=1).max())
+            errors[tip] = (gap, float(_angle(reached[:, :3, :3], recorded[:, :3, :3]).max()))
         return errors
 
     @property
     def max_closure(self) -> float:
-        """Largest closure error [m and rad]: of this trajectory, and of the solution that made it."""
+        """Largest closure error [m and rad]: of this trajectory, and of its own solution."""
         solved = self.trajectory.meta.get("closure")
-        told = [float(solved)] if isinstance(solved, int | float) else []
-        return max([value for errors in self.closure.values() for value in errors] + told, default=0.0)
+        own = [float(solved)] if isinstance(solved, int | float) else []
+        return max([value for errors in self.closure.values() for value in errors] + own, default=0.0)
 
     @property
     def singular_samples(self) -> int:
@@ -79,14 +80,14 @@ class Account:
 
     @property
     def boundaries(self) -> tuple[float, ...]:
-        """Times at which steps begin and end [s], as the trajectory tells them."""
+        """Times at which steps begin and end [s], as recorded in the trajectory."""
         times = self.trajectory.meta.get("boundaries")
         sound = isinstance(times, list) and all(isinstance(t, int | float) for t in times)
         return tuple(map(float, times)) if isinstance(times, list) and sound else ()
 
     @property
     def steps(self) -> int | None:
-        """Number of steps, if the trajectory tells it."""
+        """Number of steps, if the trajectory records it."""
         steps = self.trajectory.meta.get("steps")
         return steps if isinstance(steps, int) else None
 
@@ -107,14 +108,14 @@ class Account:
             for joint in self.robot.joints
             if (share := self.speed_use[joint.name]) > 1.0
         ]
-        # In the words of a simulation's own warning, so that a page tells it once.
-        found = [f"planned joint speed above the servo's: {', '.join(fast)}"] if fast else []
+        # In the words of a simulation's own warning, so that a page says it once.
+        noted = [f"planned joint speed above the servo's: {', '.join(fast)}"] if fast else []
         gap = float(np.diff(self.trajectory.time).max())
         if gap > _COARSE:
-            found.append(f"samples are {gap:.3g} s apart; margins and spikes between them are not seen")
+            noted.append(f"samples are {gap:.3g} s apart; margins and spikes between them are not seen")
         if self.pulled.any():
             when = self.trajectory.time[int(self.pulled.argmax())]
-            found.append(f"the robot would leave the floor at {when:.2f} s: no ZMP exists there")
+            noted.append(f"the robot would leave the floor at {when:.2f} s: no ZMP exists there")
         near = [
             f"{limb.limb} comes near a singularity at {self.trajectory.time[limb.sample]:.2f} s: {limb.cause}"
             for limb in self.limbs
@@ -127,7 +128,7 @@ class Account:
             else []
         )
         notes = self.trajectory.meta.get("notes")
-        return (*found, *near, *changed, *(map(str, notes) if isinstance(notes, list) else ()))
+        return (*noted, *near, *changed, *(map(str, notes) if isinstance(notes, list) else ()))
 
 
 def account_of(robot: Robot, trajectory: Trajectory) -> Account:
@@ -148,26 +149,23 @@ def account_of(robot: Robot, trajectory: Trajectory) -> Account:
             "positions, rates or accelerations are beyond reason"
         )
     mechanism = closed_mechanism(robot)
-    T = pose_from_array(trajectory.T_world_base)
-    twists = coupling_twists(mechanism, T.R, unstack(motion.q))
-    N = network_matrix(mechanism, twists, (trajectory.samples,))
-    sigma = singular_values(mechanism, N)
-    names = [block_name(mechanism, circuits) for circuits, _ in mechanism.blocks]
-    by_limb = {name: sigma[:, i] for i, name in enumerate(names)}
-    return Account(robot, trajectory, motion, balance, by_limb, singularity_report(mechanism, N))
+    state = State(trajectory.T_world_base, motion.q)
+    sigma = least_values(mechanism, trajectory.T_world_base, motion.q)
+    by_limb = dict(zip(block_names(mechanism), sigma.T, strict=True))
+    return Account(robot, trajectory, motion, balance, by_limb, singularity_report(mechanism, state))
 
 
 def recorded_robot(trajectory: Trajectory, path: str = "the trajectory") -> Robot:
-    """The robot that a trajectory was made for, from the table in its own ``meta``.
+    """The robot that a trajectory was planned for, from the table in its own ``meta``.
 
     Raises:
-        TrajectoryError: the table is not there, damaged, or not the one that its SHA-256 tells.
+        TrajectoryError: the table is not there, damaged, or its SHA-256 is another one.
     """
-    told = trajectory.meta.get("robot")
-    text = told.get("table") if isinstance(told, dict) else None
-    if not isinstance(told, dict) or not isinstance(text, str):
+    recorded = trajectory.meta.get("robot")
+    text = recorded.get("table") if isinstance(recorded, dict) else None
+    if not isinstance(recorded, dict) or not isinstance(text, str):
         raise TrajectoryError(f"{path}: meta holds no robot table; make it again with: screwkin walk")
-    if hashlib.sha256(text.encode()).hexdigest() != told.get("sha256"):
+    if hashlib.sha256(text.encode()).hexdigest() != recorded.get("sha256"):
         raise TrajectoryError(
             f"{path}: the robot table in meta is not the one whose SHA-256 stands beside it; it was changed "
             "after the trajectory was made. Make it again with: screwkin walk"

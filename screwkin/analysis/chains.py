@@ -1,4 +1,4 @@
-"""The serial chains of a robot told twice: by screws and by Denavit-Hartenberg tables.
+"""The serial chains of a robot in two models: by screws and by Denavit-Hartenberg tables.
 
 A screw table stays what it is whichever foot stands. A DH table begins somewhere: with the standing foot as
 its base a walk needs one set of tables per supporting foot, whose first table runs up the standing leg.
@@ -6,13 +6,14 @@ its base a walk needs one set of tables per supporting foot, whose first table r
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar
 
 from screwkin.algebra.scalar import Scalar
-from screwkin.algebra.screws import Screw, displacement, transport
-from screwkin.algebra.se3 import IDENTITY, UNTURNED, ZERO, Pose, Twist, cross, rotate
+from screwkin.algebra.screws import AT_REST, Screw, advance, carry, displacement, transport
+from screwkin.algebra.se3 import IDENTITY, Pose, Twist
 from screwkin.errors import InputError
 from screwkin.kinematics.positions import screws_in
 from screwkin.model.dh import Convention, DHTable, dh_frames, dh_jacobian
@@ -20,9 +21,11 @@ from screwkin.model.dh_csv import load_dh
 from screwkin.model.dh_derive import dh_from_screws
 from screwkin.model.robot import Robot
 
+T = TypeVar("T")
+
 
 @dataclass(frozen=True)
-class Chain:
+class ModelChain:
     """Joints from the base to a tip: their indices and screws, the tip's zero pose, and the DH table.
 
     ``printed`` says that the table stands in a file beside the robot's; the others are derived.
@@ -36,7 +39,7 @@ class Chain:
     printed: bool = False
 
 
-def chains_of(robot: Robot) -> tuple[Chain, ...]:
+def chains_of(robot: Robot) -> tuple[ModelChain, ...]:
     """A chain for every limb; without limbs, for every link that carries no other one.
 
     Tables come from ``dh/NAME.csv`` beside the robot's file where that holds the chain; others are derived.
@@ -55,7 +58,7 @@ def chains_of(robot: Robot) -> tuple[Chain, ...]:
                 f"but the robot's are {', '.join(names)}"
             )
         table = printed.get(name) or replace(dh_from_screws(screws, frame, names=names), name=name, tip=tip)
-        chains.append(Chain(name, joints, screws, frame, table, name in printed))
+        chains.append(ModelChain(name, joints, screws, frame, table, name in printed))
     if not chains:
         raise InputError(f"robot {robot.name} has no joints, so there is nothing to compare")
     return tuple(chains)
@@ -77,7 +80,7 @@ def derived_tables(robot: Robot, convention: Convention) -> tuple[DHTable, ...]:
     )
 
 
-def support_models(robot: Robot, chains: Sequence[Chain]) -> Mapping[str, tuple[DHTable, ...]]:
+def support_models(robot: Robot, chains: Sequence[ModelChain]) -> Mapping[str, tuple[DHTable, ...]]:
     """The DH tables of a walk by standing leg: first from its sole up to the base, then to all other tips."""
     legs = [limb.name for limb in robot.limbs if limb.kind == "leg"]
     models = {}
@@ -88,7 +91,7 @@ def support_models(robot: Robot, chains: Sequence[Chain]) -> Mapping[str, tuple[
     return models
 
 
-def reversed_table(chain: Chain) -> DHTable:
+def reversed_table(chain: ModelChain) -> DHTable:
     """The table of a chain from its tip to its base, for the same joint positions.
 
     (D_1 ... D_n M)^-1 = M^-1 D_n^-1 ... D_1^-1, and D^-1(q) is the displacement about the opposite axis.
@@ -100,32 +103,40 @@ def reversed_table(chain: Chain) -> DHTable:
 
 
 def by_screws(screws: Sequence[Screw], frame: Pose, q: Sequence[Scalar]) -> tuple[Pose, list[Twist]]:
-    """Tip pose, and the Jacobian's columns at the base origin, by successive screw displacements."""
-    carried, columns = IDENTITY, []
-    for screw, theta in zip(screws, q, strict=True):
-        columns.append(transport(carried, screw.twist))
-        carried = carried @ displacement(screw, theta)
-    return carried @ frame, columns
+    """Tip pose and Jacobian of a chain by the textbook's product of screw displacements.
+
+    Args:
+        screws: n axes in the zero pose, in the base frame.
+        frame: the tip's pose in the zero pose, in the base frame.
+        q: n joint positions [rad or m], scalars of any kind.
+
+    Returns:
+        The tip's pose in the base frame, and the n columns of the Jacobian: twists at the base origin.
+    """
+    places = _places(screws, q, IDENTITY, lambda before, screw, theta: before @ displacement(screw, theta))
+    columns = [transport(place, screw.twist) for place, screw in zip(places, screws, strict=False)]
+    return places[-1] @ frame, columns
 
 
-def by_steps(screws: Sequence[Screw], frame: Pose, q: Sequence[Scalar]) -> tuple[Pose, list[Twist]]:
-    """The same for revolute and prismatic joints, stepping from axis point to axis point.
+def by_library(screws: Sequence[Screw], frame: Pose, q: Sequence[Scalar]) -> tuple[Pose, list[Twist]]:
+    """The same by the chain that the library runs: ``algebra.screws.advance`` from axis point to axis point.
 
     The displacement about an axis through s0 costs a product R s0 that the next axis takes back in part;
-    carrying the difference of the axis points instead needs no more operations than DH frames do.
+    advancing by the difference of the axis points needs no more operations than DH frames do.
     """
-    R, p, here = UNTURNED, ZERO, ZERO
-    columns = []
+    places = _places(screws, q, AT_REST, advance)
+    columns = [carry(place, screw).twist for place, screw in zip(places, screws, strict=False)]
+    return places[-1] @ frame, columns
+
+
+def _places(
+    screws: Sequence[Screw], q: Sequence[Scalar], start: T, step: Callable[[T, Screw, Scalar], T]
+) -> list[T]:
+    """Displacements of the n + 1 bodies of a chain, the base among them."""
+    places = [start]
     for screw, theta in zip(screws, q, strict=True):
-        p, here = p + R @ (screw.s0 - here), screw.s0
-        axis = R @ screw.s
-        if screw.is_translation:
-            columns.append(Twist(ZERO, axis))
-            p = p + axis * theta
-        else:
-            columns.append(Twist(axis, cross(p, axis)))
-            R = R @ rotate(screw.s, theta)
-    return Pose(R @ frame.R, p + R @ (frame.p - here)), columns
+        places.append(step(places[-1], screw, theta))
+    return places
 
 
 def by_dh(table: DHTable, q: Sequence[Scalar]) -> tuple[Pose, list[Twist]]:

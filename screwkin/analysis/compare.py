@@ -1,13 +1,14 @@
-"""The screw model of a robot against its Denavit-Hartenberg model: the same motion, at which price.
+"""The screw model of a robot against its Denavit-Hartenberg model: the same motion, at what cost.
 
-Both models are run on the same joint positions in the same call; nothing is taken from the literature.
+Three ways are run on the same joint positions in the same call: DH frames, the textbook's product of screw
+displacements, and the chain that the library itself runs. Nothing is taken from the literature.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -16,11 +17,13 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.screws import at
 from screwkin.algebra.se3 import Pose, as_array, leaves, pose_from_array, rotation_log
-from screwkin.analysis.chains import Chain, by_dh, by_screws, by_steps, chains_of, support_models
+from screwkin.analysis.chains import ModelChain, by_dh, by_screws, chains_of, support_models
 from screwkin.analysis.misalignment import Misalignment, misalignment, sensitivity
-from screwkin.analysis.operations import operations
+from screwkin.analysis.operations import model_program, models_of, operations
+from screwkin.compiler.program import Program
+from screwkin.compiler.run import run
 from screwkin.errors import InputError
-from screwkin.mechanism.choice import characteristic_length
+from screwkin.mechanism.scaling import characteristic_length
 from screwkin.model.dh import DHTable, dh_fk
 from screwkin.model.robot import Robot
 
@@ -44,16 +47,17 @@ class Comparison:
         screw_jacobians: the one network matrix of the closed mechanism.
         parameters: numbers that the tables hold (see ``_parameters``).
         operations: arithmetic operations by way of computing (see ``operations.operations``).
-        seconds: time of all tips and Jacobians for 200 positions, by way: the fastest of rounds in turn.
-        speed_ratio: time by DH over time by screws; above 1 screws are faster.
-        speed_ratio_by_steps: the same for screws carried from axis point to axis point.
+        seconds: processor time of all tips and Jacobians for 200 positions [s], by way, each compiled to a
+            program as the library's own quantities are: the median of alternating rounds.
+        speed_ratio: time by DH over time by the textbook's screws; above 1 screws are faster.
+        speed_ratio_library: time by DH over time by the library's own chain.
         sensitivity: change of a model's numbers per change of its axes.
         jacobian_condition: of each chain at home, with velocities divided by the robot's size.
         misalignment: what a tilt of parallel axes does; None without parallel axes.
     """
 
     robot: str
-    chains: tuple[Chain, ...]
+    chains: tuple[ModelChain, ...]
     samples: int
     fk_max_abs: float
     jacobian_max_abs: float
@@ -65,14 +69,20 @@ class Comparison:
     operations: Mapping[str, Mapping[str, int]]
     seconds: Mapping[str, float]
     speed_ratio: float
-    speed_ratio_by_steps: float
+    speed_ratio_library: float
     sensitivity: Mapping[str, float]
     jacobian_condition: Mapping[str, float]
     misalignment: Misalignment | None
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything as JSON data; every chain with its DH rows."""
+        """Everything as JSON data; every chain with its DH rows.
+
+        The library's chain stands there under its former name too: ``screw_by_steps``, ``_by_steps``.
+        """
         plain = {name: value for name, value in vars(self).items() if name not in ("chains", "misalignment")}
+        for name in ("operations", "seconds"):
+            plain[name] = {**plain[name], "screw_by_steps": plain[name]["library"]}
+        plain["speed_ratio_by_steps"] = self.speed_ratio_library
         tables = {
             chain.name: {
                 "convention": chain.table.convention,
@@ -119,7 +129,7 @@ def compare_models(robot: Robot, samples: int = 1000, rounds: int = 21, seed: in
         operations=operations(chains),
         seconds=times,
         speed_ratio=times["dh"] / times["screw"],
-        speed_ratio_by_steps=times["dh"] / times["screw_by_steps"],
+        speed_ratio_library=times["dh"] / times["library"],
         sensitivity=sensitivity(chains, length, seed=seed),
         jacobian_condition=_conditions(robot, chains, length),
         misalignment=misalignment(chains, seed=seed),
@@ -134,15 +144,21 @@ def random_positions(robot: Robot, count: int, rng: np.random.Generator) -> Arra
     return rng.uniform(lower, np.maximum(lower, upper), (count, len(robot.joints)))
 
 
-def _of(chain: Chain, q: Array) -> list[Array]:
+def _of(chain: ModelChain, q: Array) -> list[Array]:
     """The positions of a chain's joints, batch by joint."""
     return [q[..., i] for i in chain.joints]
 
 
 def differences(
-    chains: Sequence[Chain], models: Mapping[str, Sequence[DHTable]], q: Array
+    chains: Sequence[ModelChain], models: Mapping[str, Sequence[DHTable]], q: Array
 ) -> tuple[float, float]:
-    """Largest difference of tip poses and of Jacobians between the models."""
+    """Largest difference of an entry of tip poses and of Jacobians between the models [1 and m].
+
+    Args:
+        chains: of the robot.
+        models: the DH tables of a walk by standing leg, from ``support_models``.
+        q: (samples, n) positions of all joints [rad or m].
+    """
     fk, jacobian, tips = 0.0, 0.0, dict[str, Pose]()
     for chain in chains:
         tip, columns = by_screws(chain.screws, chain.frame, _of(chain, q))
@@ -164,25 +180,25 @@ def _apart(a: Any, b: Any) -> float:
     return float(np.abs(as_array(a) - as_array(b)).max())
 
 
-def _times(chains: Sequence[Chain], q: Array, rounds: int) -> dict[str, float]:
-    """Seconds of the fastest evaluation of all chains, the ways taking turns."""
-    positions = [_of(chain, q) for chain in chains]
-    ways: dict[str, Callable[[Chain, Sequence[Array]], object]] = {
-        "dh": lambda chain, q: by_dh(chain.table, q),
-        "screw": lambda chain, q: by_screws(chain.screws, chain.frame, q),
-        "screw_by_steps": lambda chain, q: by_steps(chain.screws, chain.frame, q),
-    }
-    times: dict[str, list[float]] = {way: [] for way in ways}
-    for _ in range(rounds):
-        for way, evaluate in ways.items():
-            begin = time.perf_counter()
-            for chain, values in zip(chains, positions, strict=True):
-                evaluate(chain, values)
-            times[way].append(time.perf_counter() - begin)
-    return {way: min(each) for way, each in times.items()}
+def _times(chains: Sequence[ModelChain], q: Array, rounds: int) -> dict[str, float]:
+    """Seconds of an evaluation of all chains by way: medians of rounds in which the ways take turns."""
+    tasks: dict[str, list[tuple[Program, Array]]] = {}
+    for chain in chains:
+        values = np.ascontiguousarray(q[:, list(chain.joints)])
+        for way, model in models_of(chain).items():
+            tasks.setdefault(way, []).append((model_program(model, len(chain.joints)), values))
+    times: dict[str, list[float]] = {way: [] for way in tasks}
+    for k in range(rounds + 1):
+        for way in (*list(tasks)[k % 3 :], *list(tasks)[: k % 3]):
+            begin = time.thread_time()
+            for program, values in tasks[way]:
+                run(program, {"q": values})
+            if k > 0:  # the first round warms up
+                times[way].append(time.thread_time() - begin)
+    return {way: float(np.median(each)) for way, each in times.items()}
 
 
-def _parameters(chains: Sequence[Chain], models: int) -> dict[str, int]:
+def _parameters(chains: Sequence[ModelChain], models: int) -> dict[str, int]:
     """Numbers in the tables.
 
     ``dh``: four per joint and six for base and tool of every chain, in every model; ``dh_per_model``;
@@ -212,15 +228,15 @@ def _six(pose: Pose) -> list[float]:
     return [float(x) for x in (*pose.p, *leaves(rotation_log(pose_from_array(as_array(pose)).R)))]
 
 
-def _conditions(robot: Robot, chains: Sequence[Chain], length: float) -> dict[str, float]:
+def _conditions(robot: Robot, chains: Sequence[ModelChain], length: float) -> dict[str, float]:
     """Condition number of every chain's Jacobian at the tip, in posture ``home`` or else at zero."""
     home = next(
         (posture.q for posture in robot.postures if posture.name == "home"), (0.0,) * len(robot.joints)
     )
-    found = {}
+    condition = {}
     for chain in chains:
         tip, columns = by_screws(chain.screws, chain.frame, [home[i] for i in chain.joints])
         J = as_array([at(tip.p, column) for column in columns]).T / np.array([[1]] * 3 + [[length]] * 3)
         sigma = np.linalg.svd(J, compute_uv=False)
-        found[chain.name] = float(sigma[0] / sigma[-1]) if sigma[-1] > 1e-12 * sigma[0] else math.inf
-    return found
+        condition[chain.name] = float(sigma[0] / sigma[-1]) if sigma[-1] > 1e-12 * sigma[0] else math.inf
+    return condition

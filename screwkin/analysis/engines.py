@@ -1,4 +1,4 @@
-"""In what a trajectory is simulated: the engine, and what gives way in it."""
+"""In what a trajectory is simulated: the engine, and the compliance in it."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ ENGINES: tuple[Engine, ...] = ("pybullet", "kinematic")
 
 
 @dataclass(frozen=True)
-class Yielding:
-    """What gives way in a simulation; nothing by default.
+class SimulatedCompliance:
+    """Compliance of servos and soles in a simulation; none by default.
 
     servos: springs for servos, None for rigid ones; a stiffness of None is the one that the trajectory is
     compensated for, else the table's. sole_stiffness: of every point of contact [N/m], None for rigid soles.
@@ -35,10 +35,10 @@ class Yielding:
     def __post_init__(self) -> None:
         if self.repeat and self.servos is None:
             raise InputError(
-                "only walks on elastic servos are repeated under other conditions; let them yield"
+                "only walks on elastic servos are repeated under other conditions; give them springs"
             )
 
-    def for_trajectory(self, robot: Robot, trajectory: Trajectory) -> Yielding:
+    def for_trajectory(self, robot: Robot, trajectory: Trajectory) -> SimulatedCompliance:
         """The same with the stiffness of every joint by its name.
 
         Raises:
@@ -52,20 +52,22 @@ class Yielding:
         return replace(self, servos=replace(self.servos, stiffness=by_name))
 
 
-def opened(robot: Robot, engine: Engine, gives: Yielding, gui: bool) -> Backend:
+def opened(robot: Robot, engine: Engine, compliance: SimulatedCompliance, gui: bool) -> Backend:
     """The simulator of that name, with the robot in it.
 
     Raises:
-        UnknownNameError: no such engine. InputError: nothing can yield so in it.
+        UnknownNameError: no such engine. InputError: it has no contact forces.
         MissingDependencyError: it is not installed.
     """
     if engine not in ENGINES:
         raise UnknownNameError("engine", engine, ENGINES)
-    soles = gives.sole_stiffness
+    soles = compliance.sole_stiffness
     if engine == "kinematic":
-        if gives.servos is not None or soles is not None:
-            raise InputError("engine kinematic knows no forces, so nothing yields in it; use pybullet")
+        if compliance.servos is not None or soles is not None:
+            raise InputError(
+                "engine kinematic has no contact forces and cannot simulate compliance; use pybullet"
+            )
         return KinematicBackend(robot)
-    if gives.servos is not None:
-        return CompliantBackend(robot, gives.servos, Physics(dt=STEP, sole_stiffness=soles), gui)
+    if compliance.servos is not None:
+        return CompliantBackend(robot, compliance.servos, Physics(dt=STEP, sole_stiffness=soles), gui)
     return PyBulletBackend(robot, Physics(sole_stiffness=soles), gui)

@@ -16,7 +16,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.screws import Screw
 from screwkin.algebra.se3 import Vector, as_array, cross, dot, norm, rotate, rotation_log
-from screwkin.analysis.chains import Chain, by_screws
+from screwkin.analysis.chains import ModelChain, by_screws
 from screwkin.model.dh import DHTable, dh_fk
 from screwkin.model.dh_derive import dh_from_screws
 
@@ -38,7 +38,7 @@ class Misalignment:
         dh_length: (k,) largest change of an a or d of the chain's table [m].
         dh_angle: (k,) largest change of an alpha or offset [rad].
         screw_change: (k,) largest change of a number of the screw table.
-        dh_error: (k,) error of the tip that rounding makes of such a table [m and 1, largest entry].
+        dh_error: (k,) error of the tip by rounding with such a table [m and 1, largest entry].
         parallel_error: (k,) the same, for the table with the tilted axes taken as parallel.
     """
 
@@ -53,7 +53,7 @@ class Misalignment:
 
 
 def misalignment(
-    chains: Sequence[Chain], tilts: Sequence[float] = TILTS, seed: int = 0
+    chains: Sequence[ModelChain], tilts: Sequence[float] = TILTS, seed: int = 0
 ) -> Misalignment | None:
     """The series for the first two successive axes that are parallel and apart; None where there are none."""
     for chain in chains:
@@ -65,12 +65,14 @@ def misalignment(
     return None
 
 
-def _series(chain: Chain, tilted: int, normal: Vector, tilts: Sequence[float], seed: int) -> Misalignment:
+def _series(
+    chain: ModelChain, tilted: int, normal: Vector, tilts: Sequence[float], seed: int
+) -> Misalignment:
     screw = chain.screws[tilted]
     about = (normal + cross(screw.s, normal)) / math.sqrt(2.0)
     q = list(np.random.default_rng(seed).uniform(-math.pi, math.pi, (len(chain.screws), 100)))
     straight = dh_from_screws(chain.screws, chain.frame)
-    found = []
+    rows = []
     for tilt in tilts:
         screws = list(chain.screws)
         screws[tilted] = Screw(rotate(about, tilt) @ screw.s, screw.s0, screw.pitch)
@@ -80,17 +82,19 @@ def _series(chain: Chain, tilted: int, normal: Vector, tilts: Sequence[float], s
         lengths, angles = table_change(straight, table)
         turned = as_array(screws[tilted].s - screw.s)
         errors = [float(np.abs(as_array(dh_fk(t, q)) - exact).max()) for t in (table, merged)]
-        found.append((lengths, angles, float(np.abs(turned).max()), *errors))
+        rows.append((lengths, angles, float(np.abs(turned).max()), *errors))
     names = (chain.table.joint_names[tilted - 1], chain.table.joint_names[tilted])
-    return Misalignment(chain.name, names, np.array(tilts), *np.array(found).T)
+    return Misalignment(chain.name, names, np.array(tilts), *np.array(rows).T)
 
 
-def sensitivity(chains: Sequence[Chain], length: float, draws: int = 20, seed: int = 0) -> dict[str, float]:
+def sensitivity(
+    chains: Sequence[ModelChain], length: float, draws: int = 20, seed: int = 0
+) -> dict[str, float]:
     """Largest change of a model's numbers per change of an axis, when all axes are slightly off at random.
 
-    Axes tilt by 1e-6 rad and shift by 1e-6 of ``length``, the robot's size [m]; changes of lengths are told
-    in that size. Of the DH tables only what lies between the first and the last axis counts, as base and tool
-    are chosen. The median of the draws; about 1 is a model that follows its axes.
+    Axes tilt by 1e-6 rad and shift by 1e-6 of ``length``, the robot's size [m]; changes of lengths are
+    relative to that size. Of the DH tables only what lies between the first and the last axis counts, as base
+    and tool are chosen. The median of the draws; about 1 is a model that follows its axes.
     """
     rng = np.random.default_rng(seed)
     dh, screw = np.zeros(draws), np.zeros(draws)

@@ -1,28 +1,20 @@
-"""Arithmetic operations of symbolic kinematics after common-subexpression elimination."""
+"""Arithmetic operations of a chain's kinematics, as straight-line programs of the library's compiler."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
-from screwkin.algebra import scalar, se3
-from screwkin.algebra import screws as screw
+from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.screws import Screw
-from screwkin.algebra.se3 import UNTURNED, Pose, Twist, Vector, leaves, map_scalars
-from screwkin.analysis import chains
-from screwkin.analysis.chains import Chain, by_dh, by_screws, by_steps
-from screwkin.cache import remembered
-from screwkin.kinematics import positions
+from screwkin.algebra.se3 import UNTURNED, Pose, Twist, Vector, map_scalars
+from screwkin.analysis.chains import ModelChain, by_dh, by_library, by_screws
+from screwkin.compiler.program import Program, Recorder
+from screwkin.compiler.records import matrix
 from screwkin.kinematics.positions import screws_in
-from screwkin.model import dh
 
-_COUNTED = (chains, positions, dh, screw, se3, scalar)
-"""Modules whose formulas are counted."""
-
-Model = Callable[[Sequence[Any]], tuple[Pose, list[Twist]]]
+Model = Callable[[Sequence[Scalar]], tuple[Pose, list[Twist]]]
 """Tip pose and Jacobian columns of a chain for its joint positions."""
 
 Count = Mapping[str, int]
@@ -30,46 +22,63 @@ Count = Mapping[str, int]
 _ROUNDING = 1e-12  # m: what a change of reference leaves of equal lengths
 
 
-def operations(chains: Sequence[Chain]) -> Mapping[str, Count]:
-    """Operations of all chains together, by way of computing: ``fk``, ``jacobian``, and ``both`` at once.
-
-    Every sum, product and function counts one (sympy's count); lengths are numbers, zeros and ones of the
-    tables fold away. The ways are
-
-    - ``dh``: the chains' tables;
-    - ``algebra.screws``: successive displacements in the base frame;
-    - ``screw_best_reference``: the same, with each chain's screws told at the joint axis where that is
-      cheapest; the Jacobian is told there too, the tip's pose still in the base frame;
-    - ``screw_by_steps``: the same screws, carried from axis point to axis point.
-
-    Counting takes seconds, so what was counted once is kept in the cache folder.
-    """
-    text = [Path(str(module.__file__)).read_text(encoding="utf-8") for module in _COUNTED]
-    text.append(Path(__file__).read_text(encoding="utf-8"))
-    made_of = "\n".join([repr(tuple(chains)), version("sympy"), *text])
-    counted: Mapping[str, Count] = remembered("operations", made_of, lambda: _counted(chains))
-    return counted
-
-
-def _counted(chains: Sequence[Chain]) -> Mapping[str, Count]:
-    each: dict[str, list[Count]] = {"dh": [], "screw": [], "screw_best_reference": [], "screw_by_steps": []}
-    for chain in chains:
-        joints = len(chain.screws)
-        at_base = _count(partial(by_screws, chain.screws, chain.frame), joints)
-        points = {tuple(screw.s0): screw.s0 for screw in chain.screws}
-        moved = [_count(partial(_about, chain, point), joints) for point in points.values()]
-        each["dh"].append(_count(partial(by_dh, chain.table), joints))
-        each["screw"].append(at_base)
-        each["screw_best_reference"].append(min([at_base, *moved], key=lambda count: count["both"]))
-        each["screw_by_steps"].append(_count(partial(by_steps, chain.screws, chain.frame), joints))
+def models_of(chain: ModelChain) -> Mapping[str, Model]:
+    """The ways to compute a chain: ``dh``, ``screw`` (the textbook's) and ``library``."""
     return {
-        way: {part: sum(count[part] for count in counts) for part in ("fk", "jacobian", "both")}
-        for way, counts in each.items()
+        "dh": partial(by_dh, chain.table),
+        "screw": partial(by_screws, chain.screws, chain.frame),
+        "library": partial(by_library, chain.screws, chain.frame),
     }
 
 
-def _about(chain: Chain, point: Vector, q: Sequence[Any]) -> tuple[Pose, list[Twist]]:
-    """By screws told about a point, in base axes."""
+def model_program(model: Model, joints: int, outputs: str = "both") -> Program:
+    """Tip pose (4, 4) and Jacobian (n, 6) of a model as a straight-line program of q (n,).
+
+    Args:
+        model: the way to compute a chain.
+        joints: n.
+        outputs: ``fk``, ``jacobian`` or ``both``.
+    """
+    recorder = Recorder("chain", "Tip pose and Jacobian of a chain.")
+    tip, columns = model(recorder.input("q", joints))
+    if outputs != "jacobian":
+        recorder.output("pose", matrix(tip), 4, 4)
+    if outputs != "fk":
+        recorder.output("jacobian", columns, joints, 6)
+    return recorder.program()
+
+
+def operations(chains: Sequence[ModelChain]) -> Mapping[str, Count]:
+    """Operations of all chains together, by way of computing: ``fk``, ``jacobian``, and ``both`` at once.
+
+    Sums, products, quotients and functions of the program that would run count one each; common parts count
+    once, changes of sign not at all. Lengths are numbers; zeros and ones of the tables fold away. Ways:
+
+    - ``dh``: the chains' tables;
+    - ``screw``: the textbook's successive displacements in the base frame;
+    - ``screw_best_reference``: the same, with each chain's screws expressed at the joint axis where that is
+      cheapest; the Jacobian is expressed there too, the tip's pose still in the base frame;
+    - ``library``: the same screws as the library runs them, from axis point to axis point.
+    """
+    total: dict[str, dict[str, int]] = {}
+    for chain in chains:
+        joints = len(chain.screws)
+        counts = {way: _count(model, joints) for way, model in models_of(chain).items()}
+        points = {tuple(screw.s0): screw.s0 for screw in chain.screws}
+        moved = [_count(partial(_about, chain, point), joints) for point in points.values()]
+        counts["screw_best_reference"] = min([counts["screw"], *moved], key=lambda count: count["both"])
+        for way, count in counts.items():
+            sums = total.setdefault(way, dict.fromkeys(count, 0))
+            sums.update({part: sums[part] + number for part, number in count.items()})
+    return total
+
+
+def _count(model: Model, joints: int) -> Count:
+    return {part: model_program(model, joints, part).operations for part in ("fk", "jacobian", "both")}
+
+
+def _about(chain: ModelChain, point: Vector, q: Sequence[Any]) -> tuple[Pose, list[Twist]]:
+    """By the textbook's screws, expressed about a point in base axes."""
     reference = Pose(UNTURNED, point)
     screws = [_folded(screw) for screw in screws_in(reference, chain.screws)]
     frame = reference.inverse @ chain.frame
@@ -84,18 +93,3 @@ def _folded(screw: Screw) -> Screw:
 
 def _whole(x: Any) -> Any:
     return 0 if abs(x) < _ROUNDING else x
-
-
-def _count(model: Model, joints: int) -> Count:
-    import sympy
-
-    tip, columns = model(sympy.symbols(f"q1:{joints + 1}", real=True))
-    fk, jacobian = leaves(tip), [x for column in columns for x in leaves(column)]
-    return {"fk": _after_cse(fk), "jacobian": _after_cse(jacobian), "both": _after_cse(fk + jacobian)}
-
-
-def _after_cse(expressions: Sequence[Any]) -> int:
-    import sympy
-
-    replaced, reduced = sympy.cse([sympy.sympify(x) for x in expressions])
-    return sum(int(x.count_ops()) for x in [*(value for _, value in replaced), *reduced])

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.errors import SafetyError, UnknownNameError
+from screwkin.errors import InputError, SafetyError, UnknownNameError
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
-from screwkin.trajectory import Trajectory, load_trajectory, sha256_of
+from screwkin.trajectory import Trajectory, check_joints, load_trajectory, sha256_of
 
 VERDICT = "validation.json"
 _ROUNDING = 1e-9  # a posture may lie on a limit, up to rounding
@@ -24,7 +24,7 @@ _ROUNDING = 1e-9  # a posture may lie on a limit, up to rounding
 
 @dataclass(frozen=True, eq=False)
 class Ready:
-    """A trajectory that may be sent, the robot whose table made it, and the verdict that let it pass."""
+    """A trajectory that may be sent, the robot that it was planned for, and the verdict that let it pass."""
 
     trajectory: Trajectory
     robot: Robot
@@ -46,12 +46,12 @@ def ready(path: str | Path, robot: str | Path | None = None) -> Ready:
     """
     path = Path(path)
     if path.suffix in (".csv", ".json"):
-        load_trajectory(path)  # tells which file to give instead
+        load_trajectory(path)  # says which file is expected instead
     sha256 = sha256_of(path)
     verdict = _passed(path, sha256)
     trajectory = load_trajectory(path)
     if trajectory.sha256 != sha256:
-        raise SafetyError(f"{path} changed while it was read; make it again and validate it")
+        raise SafetyError(f"{path} changed while it was read; plan it again and validate it")
     known = _same_robot(path, trajectory, robot)
     reasons = [*limit_faults(known, trajectory), *_torque_faults(verdict)]
     if reasons:
@@ -107,7 +107,7 @@ def _passed(path: Path, sha256: str) -> dict[str, Any]:
     except (OSError, ValueError, RecursionError) as error:
         raise SafetyError(f"{beside} cannot be read ({error}). {do}") from None
     if not isinstance(verdict, dict) or "passed" not in verdict or "trajectory_sha256" not in verdict:
-        raise SafetyError(f"{beside} is no verdict: it lacks passed or trajectory_sha256. {do}")
+        raise SafetyError(f"{beside} is no verdict: passed or trajectory_sha256 is missing. {do}")
     if verdict["trajectory_sha256"] != sha256:
         raise SafetyError(
             f"{beside} is about another trajectory, or {path.name} was changed after it was validated: its "
@@ -115,20 +115,18 @@ def _passed(path: Path, sha256: str) -> dict[str, Any]:
         )
     if verdict["passed"] is not True:
         reasons = verdict.get("reasons")
-        told = "; ".join(map(str, reasons)) if isinstance(reasons, list) and reasons else "no reason told"
-        raise SafetyError(f"{path} did not pass validation: {told}. Change the gait, and validate again")
+        why = "; ".join(map(str, reasons)) if isinstance(reasons, list) and reasons else "no reason recorded"
+        raise SafetyError(f"{path} did not pass validation: {why}. Change the gait, and validate again")
     return verdict
 
 
 def _same_robot(path: Path, trajectory: Trajectory, robot: str | Path | None) -> Robot:
-    """The robot as its table stands now, if it is the table that the trajectory was made from."""
-    told = trajectory.meta.get("robot")
-    told = told if isinstance(told, dict) else {}
-    table, name = told.get("table"), told.get("name")
+    """The robot as its table stands now, if it is the table that the trajectory was planned with."""
+    meta = trajectory.meta.get("robot")
+    recorded = meta if isinstance(meta, dict) else {}
+    table, name = recorded.get("table"), recorded.get("name")
     if not isinstance(table, str) or not isinstance(name, str):
-        raise SafetyError(
-            f"{path}: it does not tell which robot it is for. Make it again with: screwkin walk"
-        )
+        raise SafetyError(f"{path}: it does not say which robot it is for. Plan it again with: screwkin walk")
     try:
         now = load_robot(name if robot is None else robot)
     except UnknownNameError as error:
@@ -137,14 +135,16 @@ def _same_robot(path: Path, trajectory: Trajectory, robot: str | Path | None) ->
         raise SafetyError(
             f"{path} is for the robot {name!r}, whose table is not a bundled one. Name it: --robot FILE.toml"
         ) from error
-    if now.text != table or told.get("sha256") != _sha(table):
+    if now.text != table or recorded.get("sha256") != _sha(table):
         raise SafetyError(
-            f"{path} was made for another table than {now.path}: the table of {now.name!r} changed "
+            f"{path} was planned for another table than {now.path}: the table of {now.name!r} changed "
             f"since (SHA-256 {_sha(table)[:12]}… then, {_sha(now.text)[:12]}… now). "
-            "Make it again, or name the table it was made for: --robot FILE.toml"
+            "Plan it again, or name the table it was planned for: --robot FILE.toml"
         )
-    if trajectory.joint_names != now.joint_names:
-        raise SafetyError(f"{path} does not move the joints of {now.name} in the order of its table")
+    try:
+        check_joints(now, trajectory.joint_names, str(path))
+    except InputError as error:
+        raise SafetyError(str(error)) from error
     return now
 
 

@@ -11,7 +11,7 @@ from screwkin.errors import InputError
 from screwkin.model.robot import Robot
 from screwkin.servo.log import PlayLog
 from screwkin.servo.servo_map import ServoMap
-from screwkin.trajectory import Trajectory
+from screwkin.trajectory import Trajectory, check_joints
 
 _FEWEST = 6  # readings of a joint: a cubic with some to spare
 _LAGS = np.arange(0.0, 0.2, 0.001)  # s
@@ -21,8 +21,8 @@ def replayed(robot: Robot, trajectory: Trajectory, log: PlayLog) -> tuple[Trajec
     """The part of a trajectory that was played, and the same with joints as they were measured.
 
     A joint's motion is taken to be the plan, late by the time that fits its readings best, and a rest: a
-    cubic smoothing spline, as close to what is left of the readings as a servo's ticks can tell. So what a
-    servo does is not blurred more than its sensor makes it.
+    cubic smoothing spline, as close to the residual of the readings as a servo's ticks resolve. So the
+    motion of a servo is not blurred more than by its sensor.
 
     Args:
         robot: of the trajectory, with ``[servos]``.
@@ -48,16 +48,14 @@ def replayed(robot: Robot, trajectory: Trajectory, log: PlayLog) -> tuple[Trajec
 
 
 def _check_same(robot: Robot, trajectory: Trajectory, log: PlayLog) -> None:
-    told, name = log.meta.get("trajectory_sha256"), log.meta.get("robot")
-    if name != robot.name or log.joint_names != robot.joint_names:
+    played, name = log.meta.get("trajectory_sha256"), log.meta.get("robot")
+    if name != robot.name:
+        raise InputError(f"the log is of robot {name}; the trajectory moves {robot.name}")
+    check_joints(robot, log.joint_names, "the log")
+    if played != trajectory.sha256:
         raise InputError(
-            f"the log is of robot {name} with joints {', '.join(log.joint_names)}; the trajectory moves "
-            f"{robot.name} with {', '.join(robot.joint_names)}"
-        )
-    if told != trajectory.sha256:
-        raise InputError(
-            f"the log is of another trajectory: it was played from one with SHA-256 {str(told)[:12]}…, this "
-            f"one has {trajectory.sha256[:12]}…. Give the trajectory that was sent, unchanged"
+            f"the log is of another trajectory: it was played from one with SHA-256 {str(played)[:12]}…, "
+            f"this one has {trajectory.sha256[:12]}…. Expected the trajectory that was sent, unchanged"
         )
 
 

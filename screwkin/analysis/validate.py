@@ -10,7 +10,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.analysis.compliance import Conditions, StudyRow, Trial, repeated, summarised
-from screwkin.analysis.engines import Engine, Yielding, opened
+from screwkin.analysis.engines import Engine, SimulatedCompliance, opened
 from screwkin.errors import InputError
 from screwkin.gait.balance import zmp as balance_of
 from screwkin.gait.compensation import way_of
@@ -21,7 +21,7 @@ from screwkin.sim.compliant import CompliantBackend
 from screwkin.sim.measure import WINDOW, Slip, ZmpRecord, slip, speed_use, torque_use, zmp_record
 from screwkin.sim.render import pictures
 from screwkin.sim.run import Run, Schedule, simulate
-from screwkin.trajectory import Trajectory
+from screwkin.trajectory import Trajectory, check_joints
 
 _SERIES = ("run", "zmp", "pictures")
 
@@ -39,12 +39,12 @@ class Criteria:
 
 @dataclass(frozen=True, eq=False)
 class Validation:
-    """The verdict. ``to_dict`` gives its numbers as JSON data; series and pictures are for reports.
+    """The verdict. ``to_dict`` returns its numbers as JSON data; series and pictures are for reports.
 
     zmp_rms_mm and zmp_max_mm: contact ZMP against the planned one, the larger of x and y; the ``_xy`` fields
-    tell both, and ankle_rms_xy_mm the ankle sensors against the contacts; None where nothing was measured.
+    hold both, and ankle_rms_xy_mm the ankle sensors against the contacts; None where nothing was measured.
     compensation: how the commands allow for elastic servos, or ``none``; joint_stiffness [N m/rad] and
-    sole_stiffness [N/m]: what yields in the simulation, None if rigid; repeated: runs under other conditions.
+    sole_stiffness [N/m]: of the simulated springs, None if rigid; repeated: runs under other conditions.
     """
 
     passed: bool
@@ -82,8 +82,8 @@ class Validation:
     def to_dict(self) -> dict[str, Any]:
         """All but the series, as JSON data for ``validation.json``."""
         values = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in _SERIES}
-        told = {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
-        return told | {"repeated": None if self.repeated is None else self.repeated.to_dict()}
+        plain = {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
+        return plain | {"repeated": None if self.repeated is None else self.repeated.to_dict()}
 
 
 def validate(
@@ -94,7 +94,7 @@ def validate(
     gui: bool = False,
     camera: Camera | None = None,
     criteria: Criteria | None = None,
-    gives: Yielding | None = None,
+    compliance: SimulatedCompliance | None = None,
     progress: Callable[[float], None] | None = None,
     motion: Trajectory | None = None,
 ) -> Validation:
@@ -106,34 +106,36 @@ def validate(
         engine: ``pybullet`` (bodies, motors, contacts) or ``kinematic`` (perfect tracking; never passes).
         gui: show a window, in real time.
         camera: take its pictures of what happens; they need neither display nor simulator.
-        criteria: what a walk must keep to.
-        gives: what yields; by default nothing does. In repeated runs the robot may not fall either.
+        criteria: what a walk must satisfy.
+        compliance: of servos and soles; by default all are rigid. In repeated runs the robot may not fall.
         progress: called now and then with the share done.
         motion: what the joints do instead, as of servos that were measured; judged against the trajectory.
 
     Raises:
-        InputError: unknown engine, a trajectory of another robot, or nothing that can yield so.
+        InputError: unknown engine, a trajectory of another robot, or compliance that the engine has not.
         MissingDependencyError: the engine is not installed.
     """
     _check_fit(robot, trajectory)
-    rule, told = criteria or Criteria(), progress or (lambda share: None)
-    gives = (gives or Yielding()).for_trajectory(robot, trajectory)
-    first = 0.2 if gives.repeat else 1.0
-    backend = opened(robot, engine, gives, gui)
+    rule, report = criteria or Criteria(), progress or (lambda share: None)
+    compliance = (compliance or SimulatedCompliance()).for_trajectory(robot, trajectory)
+    first = 0.2 if compliance.repeat else 1.0
+    backend = opened(robot, engine, compliance, gui)
     try:
-        run = simulate(robot, motion or trajectory, backend, rule.schedule, lambda share: told(first * share))
+        run = simulate(
+            robot, motion or trajectory, backend, rule.schedule, lambda share: report(first * share)
+        )
     finally:
         backend.close()
     taken = film(robot, trajectory, run, camera) if camera else ()
-    check = replace(judged(robot, trajectory, run, rule, gives), pictures=taken)
-    if not gives.repeat or gives.servos is None:
+    check = replace(judged(robot, trajectory, run, rule, compliance), pictures=taken)
+    if not compliance.repeat or compliance.servos is None:
         return check
-    conditions = Conditions(sole_stiffness=gives.sole_stiffness)
+    conditions = Conditions(sole_stiffness=compliance.sole_stiffness)
 
     def later(share: float) -> None:
-        told(first + (1.0 - first) * share)
+        report(first + (1.0 - first) * share)
 
-    return _repeated(check, repeated(robot, trajectory, gives.servos.stiffness, conditions, later))
+    return _repeated(check, repeated(robot, trajectory, compliance.servos.stiffness, conditions, later))
 
 
 def _repeated(check: Validation, trials: Sequence[Trial]) -> Validation:
@@ -152,23 +154,23 @@ def film(robot: Robot, trajectory: Trajectory, run: Run, camera: Camera) -> tupl
 
 
 def _check_fit(robot: Robot, trajectory: Trajectory) -> None:
-    if trajectory.joint_names != robot.joint_names:
-        raise InputError(
-            f"the trajectory moves the joints {', '.join(trajectory.joint_names)}, but robot {robot.name} "
-            f"has {', '.join(robot.joint_names)}; give the robot it was made for"
-        )
+    check_joints(robot, trajectory.joint_names)
     legs = [limb.tip for limb in robot.limbs if limb.kind == "leg"]
     missing = [foot for foot in legs if foot not in trajectory.feet]
     if missing:
-        raise InputError(f"the trajectory tells no contact of {', '.join(missing)} of robot {robot.name}")
+        raise InputError(f"the trajectory has no contact of {', '.join(missing)} of robot {robot.name}")
 
 
 def judged(
-    robot: Robot, trajectory: Trajectory, run: Run, criteria: Criteria, gives: Yielding | None = None
+    robot: Robot,
+    trajectory: Trajectory,
+    run: Run,
+    criteria: Criteria,
+    compliance: SimulatedCompliance | None = None,
 ) -> Validation:
-    """The verdict on a finished run, in which something gave way or nothing did."""
-    gives = (gives or Yielding()).for_trajectory(robot, trajectory)
-    springs = gives.servos.stiffness if gives.servos is not None else None
+    """The verdict on a finished run, of compliant or rigid servos and soles."""
+    compliance = (compliance or SimulatedCompliance()).for_trajectory(robot, trajectory)
+    springs = compliance.servos.stiffness if compliance.servos is not None else None
     legs = tuple(limb.tip for limb in robot.limbs if limb.kind == "leg")
     zmp, slipped = zmp_record(run, trajectory), slip(run, trajectory, legs)
     rms, largest = _deviation(zmp.contact - zmp.planned)
@@ -203,7 +205,7 @@ def judged(
         trajectory_sha256=trajectory.sha256,
         compensation=way_of(trajectory),
         joint_stiffness=dict(springs) if isinstance(springs, Mapping) else None,
-        sole_stiffness=gives.sole_stiffness,
+        sole_stiffness=compliance.sole_stiffness,
         repeated=None,
         run=run,
         zmp=zmp,

@@ -21,7 +21,7 @@ from screwkin.errors import InputError
 from screwkin.ik.limb import resting
 from screwkin.ik.reach import OUT_OF_REACH, REACHABLE, cause_names, reach
 from screwkin.kinematics.serial_chain import SerialChain
-from screwkin.model.robot import Robot
+from screwkin.model.robot import Robot, refuse_closures
 
 Progress = Callable[[float], None]
 
@@ -109,12 +109,7 @@ def workspace(
         UnknownNameError: no such limb.
     """
     chain = SerialChain.of(robot, limb)
-    if robot.closures:
-        names = ", ".join(closure.name for closure in robot.closures)
-        raise InputError(
-            f"{robot.name} has closures ({names}); workspaces are mapped for trees only, and no function "
-            "maps those of closed loops yet"
-        )
+    refuse_closures(robot, "workspace", "no function maps those of closed loops yet")
     if len(chain.joints) < 6:
         raise InputError(
             f"{chain.limb} has {len(chain.joints)} joints; six are needed to hold its tip's orientation"

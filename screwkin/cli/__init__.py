@@ -24,11 +24,11 @@ VERBS = {
     "convert": "Convert a robot between screw tables, URDF and DH tables.",
     "compare": "The screw model of a robot against its Denavit-Hartenberg model.",
     "ik": "Inverse kinematics methods compared on a limb: iterations, coverage, time.",
-    "walk": "Make the trajectory of a gait, with plots and a report.",
+    "walk": "Plan the trajectory of a gait, with plots and a report.",
     "zmp": "Recompute CoM, ZMP, margins and spikes of a trajectory.",
     "validate": "Simulate a trajectory and give a verdict.",
     "workspace": "Where a foot can go, held level, and which joint limit cuts there.",
-    "stiffness": "How far a foot yields on elastic joints, all over its workspace.",
+    "stiffness": "Deflection of a foot on elastic joints, all over its workspace.",
     "codegen": "A robot's formulas as C, for other programs and microcontrollers.",
     "send": "Play a validated trajectory to the servos; a dry run unless --go.",
     "bus": "Servos on a bus, or virtual ones: screwkin bus --help lists the verbs.",
@@ -53,7 +53,7 @@ Verbs:
 {verbs}
 
 Options:
-  --help     Show this message; screwkin VERB --help tells about a verb.
+  --help     Show this message; screwkin VERB --help explains a verb.
   --version  Show the version.
   --debug    With any verb: show the traceback of an error.
 
@@ -89,7 +89,7 @@ def run(argv: Sequence[str]) -> int:
             import traceback
 
             traceback.print_exc()
-        return _told(error, words, debug)
+        return _report(error, words, debug)
 
 
 def _dispatch(words: Sequence[str]) -> int:
@@ -126,8 +126,8 @@ def _dispatch(words: Sequence[str]) -> int:
     return int(code or 0)
 
 
-def _told(error: Exception, words: Sequence[str], debug: bool) -> int:
-    """Tell an error in one message, with ``--json`` also as an object on stdout; returns its exit code."""
+def _report(error: Exception, words: Sequence[str], debug: bool) -> int:
+    """Print an error as one message, with ``--json`` also as an object on stdout; returns its exit code."""
     if isinstance(error, ScrewkinError):
         code, message = error.exit_code, str(error)
     elif hasattr(error, "format_message"):  # typer's own: an unknown option, a missing argument
@@ -141,6 +141,6 @@ def _told(error: Exception, words: Sequence[str], debug: bool) -> int:
         from screwkin.cli.output import print_json
 
         facts = {"limb": getattr(error, "limb", ""), "sample": getattr(error, "sample", -1)}
-        told = {key: value for key, value in facts.items() if value not in ("", -1)}
-        print_json({"error": message, "exit_code": code, **told})
+        known = {key: value for key, value in facts.items() if value not in ("", -1)}
+        print_json({"error": message, "exit_code": code, **known})
     return code

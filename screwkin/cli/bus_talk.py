@@ -18,8 +18,18 @@ from screwkin.model.table import load_robot
 from screwkin.servo.bus import Bus, open_line
 from screwkin.servo.calibrate import calibrated, turned, zeros
 from screwkin.servo.profiles import load_profile
+from screwkin.servo.protocols import codec
 from screwkin.servo.servo_map import ServoMap
-from screwkin.servo.survey import BAUDS, IDS, PROTOCOLS, Found, differences, measured_angles, readings, scan
+from screwkin.servo.survey import (
+    BAUDS,
+    IDS,
+    PROTOCOLS,
+    AnsweringServo,
+    measured_angles,
+    readings,
+    scan,
+    servo_differences,
+)
 
 Port = Annotated[str, typer.Option(help="Serial port of the servos, as /dev/ttyUSB0.")]
 Rs485 = Annotated[bool, typer.Option("--rs485", help="Let the kernel switch direction.")]
@@ -36,43 +46,45 @@ def bus_scan(
     rs485: Rs485 = False,
     as_json: AsJson = False,
 ) -> int:
-    """Who answers on a bus. With --robot every difference from its table is told, and the exit code is 3."""
+    """Who answers on a bus. With --robot all differences from its table are listed; exit code 3."""
     servos = ServoMap.of(load_robot(robot)) if robot else None
-    if protocol not in (0.0, *PROTOCOLS):
-        raise InputError(f"--protocol {protocol} is none of servos; give 1.0 or 2.0")
+    if protocol:
+        codec(protocol)  # refuses one that there is not
     if baud < 0 or last not in IDS:
-        raise InputError(f"--baud {baud} and --last {last}: give a rate above 0, and an id up to {IDS[-1]}")
+        raise InputError(
+            f"--baud {baud} and --last {last}: expected a rate above 0, and an id up to {IDS[-1]}"
+        )
     own = servos is not None and not everything
     bauds = (baud,) if baud else (servos.baud,) if servos and own else BAUDS
     protocols = (protocol,) if protocol else (servos.protocol,) if servos and own else PROTOCOLS
-    found = _scanned(port, bauds, protocols, last, rs485)
-    wrong = differences(found, servos) if servos else []
+    answering = _scanned(port, bauds, protocols, last, rs485)
+    wrong = servo_differences(answering, servos) if servos else []
     if as_json:
         rows = [
             {"id": f.id, "model": f.name, "number": f.model, "protocol": f.protocol, "baud": f.baud}
-            for f in found
+            for f in answering
         ]
         print_json({"servos": rows, "differences": wrong})
     else:
-        cells = [(f.id, f.name, f"protocol {f.protocol}", f"{f.baud} baud") for f in found]
+        cells = [(f.id, f.name, f"protocol {f.protocol}", f"{f.baud} baud") for f in answering]
         print(aligned(cells, "  ") if cells else "no servo answers; are power and port right?")
         for line in wrong:
             print(line)
-    return 3 if wrong or not found else 0
+    return 3 if wrong or not answering else 0
 
 
 def bus_read(
     port: Port,
-    robot: Annotated[str, typer.Option(help="Tell the joints of this robot.")] = "",
+    robot: Annotated[str, typer.Option(help="Read the joints of this robot.")] = "",
     id: Annotated[int, typer.Option(help="Read all registers of this servo.")] = -1,
-    model: Annotated[str, typer.Option(help="Model of that servo, where no --robot tells it.")] = "",
+    model: Annotated[str, typer.Option(help="Model of that servo, where no --robot names it.")] = "",
     baud: Annotated[int, typer.Option(help="Bits per second; default: the robot's, or 1000000.")] = 0,
     rs485: Rs485 = False,
     as_json: AsJson = False,
 ) -> int:
     """Read joint angles of a robot's servos, or with --id all registers of one servo. Nothing is written."""
     if not robot and (id < 0 or not model):
-        raise InputError("tell what to read: --robot NAME, or --id N with --model NAME")
+        raise InputError("nothing to read; expected --robot NAME, or --id N with --model NAME")
     servos = ServoMap.of(load_robot(robot)) if robot else None
     profile = load_profile(model) if model else servos.by_id(id).profile if servos and id >= 0 else None
     speaks = profile.protocol if profile else servos.protocol if servos else 1.0
@@ -121,7 +133,7 @@ def bus_calibrate(
     else:
         print(aligned([(joint, f"{value:+.4f} rad") for joint, value in zero.items()], "  "))
         print(f"written to {write}")
-        remark("Walks made with the old table are refused now: make and validate them again.")
+        remark("Walks planned with the old table are refused now: plan and validate them again.")
     return 0
 
 
@@ -133,8 +145,8 @@ def _posture(robot: Robot, name: str) -> tuple[float, ...]:
 
 def _scanned(
     port: str, bauds: tuple[int, ...], protocols: tuple[float, ...], last: int, rs485: bool
-) -> list[Found]:
-    found: list[Found] = []
+) -> list[AnsweringServo]:
+    answering: list[AnsweringServo] = []
     total, done = len(bauds) * len(protocols) * (last + 1), 0
     with progress_bar("scan") as share:
         for baud in bauds:
@@ -143,12 +155,12 @@ def _scanned(
                     bus.retries, bus.patience = 1, _SCAN_PATIENCE
                     begun = done
 
-                    def tell(id: int, begun: int = begun) -> None:
+                    def show(id: int, begun: int = begun) -> None:
                         share((begun + id) / total)
 
-                    found += scan(bus, range(last + 1), tell)
+                    answering += scan(bus, range(last + 1), show)
                 done += last + 1
-    return found
+    return answering
 
 
 @contextmanager

@@ -11,9 +11,9 @@ from typing import Annotated
 
 import typer
 
+from screwkin.cli.injected import Faults, FormerFaults, Seed, injected_faults
 from screwkin.cli.options import AsJson, RobotName
 from screwkin.cli.output import print_json, remark, silent
-from screwkin.cli.troubles import Seed, Troubles, troubles_of
 from screwkin.errors import InputError, OutputError
 from screwkin.model.table import load_robot
 from screwkin.servo.line import MonotonicClock
@@ -33,7 +33,8 @@ def virtual(
         float | None, typer.Option(help="Of every joint [N m/rad]; default: the table's, or rigid.")
     ] = None,
     return_delay: Annotated[float, typer.Option(help="From command to answer [microseconds].")] = 500.0,
-    trouble: Troubles = None,
+    inject_fault: Faults = None,
+    trouble: FormerFaults = None,
     seed: Seed = 0,
     seconds: Annotated[
         float | None, typer.Option(help="End after this time; default: when interrupted.")
@@ -42,17 +43,17 @@ def virtual(
 ) -> int:
     """Stand in for the servos of a robot on a pseudo-terminal, which any driver opens as a serial port."""
     if seconds is not None and not (math.isfinite(seconds) and seconds >= 0):
-        raise InputError(f"--seconds {seconds!r} is no time; give a number of seconds")
+        raise InputError(f"--seconds {seconds!r} is no time; expected a number of seconds")
     table, clock = load_robot(robot), MonotonicClock()
     mapped = ServoMap.of(table)
     q = None if posture is None else table.posture(posture).q
     servos = virtual_servos(table, q, stiffness, 1e-6 * return_delay)
     start = clock.now()
-    bus = VirtualBus(servos, clock, mapped.baud, troubles_of(trouble, start), seed)
+    bus = VirtualBus(servos, clock, mapped.baud, injected_faults(inject_fault, trouble, start=start), seed)
     with PseudoTerminal(bus) as terminal, _linked(link, terminal.path) as port:
-        told = {"port": port, "robot": table.name, "servos": len(servos), "protocol": mapped.protocol}
+        facts = {"port": port, "robot": table.name, "servos": len(servos), "protocol": mapped.protocol}
         if as_json:
-            print_json({**told, "baud": mapped.baud, "ids": mapped.ids})
+            print_json({**facts, "baud": mapped.baud, "ids": mapped.ids})
         else:
             print(f"{len(servos)} virtual servos of {table.name} at {port}, {mapped.baud} baud", flush=True)
         (silent if as_json else remark)("End with Ctrl-C." if seconds is None else f"Ends in {seconds:g} s.")
@@ -79,7 +80,7 @@ def _linked(link: Path | None, path: str) -> Iterator[str]:
     try:
         link.symlink_to(path)
     except OSError as error:
-        raise OutputError(f"--link {link} cannot be made ({error.strerror}); give a new name") from None
+        raise OutputError(f"--link {link} cannot be created ({error.strerror}); choose a new name") from None
     try:
         yield str(link)
     finally:

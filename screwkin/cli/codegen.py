@@ -31,11 +31,11 @@ def codegen(
         for name, text in files.items():
             with atomic_write(folder / name) as file:
                 file.write(text)
-    told = {program.name: program.operations for program in programs}
+    counts = {program.name: program.operations for program in programs}
     if as_json:
-        print_json({"robot": loaded.name, "files": list(files), "operations": told})
+        print_json({"robot": loaded.name, "files": list(files), "operations": counts})
     else:
-        for name, count in told.items():
+        for name, count in counts.items():
             print(f"{name}: {count} operations a sample")
         print(f"files in {folder}: {', '.join(files)}")
     return 0

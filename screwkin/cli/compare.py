@@ -17,10 +17,10 @@ from screwkin.model.dh_csv import dh_text
 from screwkin.model.table import load_robot
 
 _WAYS = {
-    "dh": "DH frames",
-    "screw": "screws, successive displacements",
+    "screw": "screws, the textbook's displacements",
     "screw_best_reference": "screws, best reference frame",
-    "screw_by_steps": "screws, from axis to axis",
+    "library": "screws, the library's chain",
+    "dh": "DH frames",
 }
 
 
@@ -36,73 +36,85 @@ def compare(
 ) -> int:
     """Compare the screw model of a robot with its Denavit-Hartenberg model.
 
-    Makes dh.csv (the tables: those beside the robot's file, the others derived) and misalignment.png. Exit
+    Writes dh.csv (the tables: those beside the robot's file, the others derived) and misalignment.png. Exit
     code 3 if the models disagree by more than 1e-9.
     """
     table = load_robot(robot)
     with output_folder(output, "compare", table.name) as folder:
-        found = compare_models(table, samples, rounds)
-        files = _write(found, folder, plots)
+        comparison = compare_models(table, samples, rounds)
+        files = _write(comparison, folder, plots)
     if as_json:
-        print_json({**found.to_dict(), "folder": str(folder)})
+        print_json({**comparison.to_dict(), "folder": str(folder)})
     else:
-        print(_text(found))
+        print(_text(comparison))
         print(f"files in {folder}: {', '.join(path.name for path in files)}")
-    agree = max(found.fk_max_abs, found.jacobian_max_abs) <= 1e-9
+    agree = max(comparison.fk_max_abs, comparison.jacobian_max_abs) <= 1e-9
     if not agree:
         remark("the DH tables do not describe this robot")
     return 0 if agree else 3
 
 
-def _write(found: Comparison, folder: Path, plots: bool) -> list[Path]:
+def _write(comparison: Comparison, folder: Path, plots: bool) -> list[Path]:
     files = [folder / "dh.csv"]
     with atomic_write(files[0]) as file:
-        file.write(dh_text([chain.table for chain in found.chains]))
-    if plots and found.misalignment is not None:
+        file.write(dh_text([chain.table for chain in comparison.chains]))
+    if plots and comparison.misalignment is not None:
         from screwkin.report.misalignment import save_misalignment
 
-        files.append(save_misalignment(found.misalignment, folder / "misalignment.png"))
+        files.append(save_misalignment(comparison.misalignment, folder / "misalignment.png"))
     return files
 
 
-def _text(found: Comparison) -> str:
-    printed = [chain.name for chain in found.chains if chain.printed]
-    others = "" if len(printed) == len(found.chains) else ", the others derived"
+def _text(comparison: Comparison) -> str:
+    printed = [chain.name for chain in comparison.chains if chain.printed]
+    others = "" if len(printed) == len(comparison.chains) else ", the others derived"
     tables = f"of {', '.join(printed)} from file{others}" if printed else "derived from the screws"
-    numbers = found.parameters
-    told = [
+    numbers = comparison.parameters
+    rows: list[Sequence[object]] = [
         ("", "DH", "screws"),
-        ("largest difference of a tip's pose", f"{found.fk_max_abs:.1e}", ""),
-        ("largest difference of a Jacobian", f"{found.jacobian_max_abs:.1e}", ""),
-        ("models for a walk" if found.dh_models > 1 else "models", found.dh_models, found.screw_models),
-        ("Jacobians", found.dh_jacobians, found.screw_jacobians),
+        ("largest difference of a tip's pose", f"{comparison.fk_max_abs:.1e}", ""),
+        ("largest difference of a Jacobian", f"{comparison.jacobian_max_abs:.1e}", ""),
+        (
+            "models for a walk" if comparison.dh_models > 1 else "models",
+            comparison.dh_models,
+            comparison.screw_models,
+        ),
+        ("Jacobians", comparison.dh_jacobians, comparison.screw_jacobians),
         ("numbers in one model", numbers["dh_per_model"], numbers["screw"]),
         ("  of these not zero", numbers["dh_not_zero"], numbers["screw_not_zero"]),
         ("numbers in all models", numbers["dh"], numbers["screw"]),
         (
             "change of numbers per change of axes",
-            *(f"{found.sensitivity[way]:.1e}" for way in ("dh", "screw")),
+            *(f"{comparison.sensitivity[way]:.1e}" for way in ("dh", "screw")),
         ),
     ]
-    parts = [f"{found.robot}: DH tables {tables}", aligned(told, "  "), "", _ways(found), _tilt(found)]
+    parts = [
+        f"{comparison.robot}: DH tables {tables}",
+        aligned(rows, "  "),
+        "",
+        _ways(comparison),
+        _tilt(comparison),
+    ]
     return "\n".join(part for part in parts if part is not None)
 
 
-def _ways(found: Comparison) -> str:
+def _ways(comparison: Comparison) -> str:
     """Operations and times by way of computing."""
     rows: list[Sequence[object]] = [
-        ("operations after elimination of common parts", "FK", "Jacobian", "both", "time")
+        ("operations of the program", "FK", "Jacobian", "both", "time", "DH's time over it")
     ]
     for way, name in _WAYS.items():
-        count = found.operations[way]
-        time = f"{1e6 * found.seconds[way]:.0f} us" if way in found.seconds else ""
-        rows.append((f"  {name}", count["fk"], count["jacobian"], count["both"], time))
+        count = comparison.operations[way]
+        seconds = comparison.seconds.get(way)
+        time = f"{1e6 * seconds:.0f} us" if seconds else ""
+        ratio = f"{comparison.seconds['dh'] / seconds:.2f}" if seconds else ""
+        rows.append((f"  {name}", count["fk"], count["jacobian"], count["both"], time, ratio))
     return aligned(rows, "  ")
 
 
-def _tilt(found: Comparison) -> str | None:
+def _tilt(comparison: Comparison) -> str | None:
     """What the smallest tilt does, in words."""
-    series = found.misalignment
+    series = comparison.misalignment
     if series is None:
         return None
     length = max(series.dh_length)

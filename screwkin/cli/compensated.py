@@ -122,9 +122,9 @@ def compensated(
         NoSolutionError, LimitError: such servos cannot be compensated. Others as of ``compensate``.
     """
     method, model = WAYS[wanted.way]
-    told = compensate(robot, trajectory, wanted.stiffness, method, wanted.passes, model)
-    told = replace(told, meta={**told.meta, "command": command})
+    commands = compensate(robot, trajectory, wanted.stiffness, method, wanted.passes, model)
+    commands = replace(commands, meta={**commands.meta, "command": command})
     rows: Sequence[Remaining] = ()
     if model != "dynamic":
         rows = convergence(robot, trajectory, wanted.stiffness, wanted.passes, method, model)
-    return Compensated(wanted, told, folder / FOLDER / "trajectory.npz", rows)
+    return Compensated(wanted, commands, folder / FOLDER / "trajectory.npz", rows)

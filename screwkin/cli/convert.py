@@ -37,7 +37,7 @@ def convert(
 ) -> int:
     """Convert a robot between screw tables (.toml), URDF (.urdf) and Denavit-Hartenberg tables (.csv).
 
-    What the target cannot hold is told. Formulas and mirrored limbs are written out.
+    What the target cannot hold is listed. Formulas and mirrored limbs are written out.
     """
     chosen = next((known for known in CONVENTIONS if known == convention), None)
     if chosen is None:
@@ -50,8 +50,8 @@ def convert(
         file.write(text)
     remarks += lost
     if as_json:
-        told = {"robot": robot.name, "file": str(target), "joints": robot.joint_names, "remarks": remarks}
-        print_json(told)
+        data = {"robot": robot.name, "file": str(target), "joints": robot.joint_names, "remarks": remarks}
+        print_json(data)
     else:
         print(f"{target}: {robot.name}, {len(robot.links)} links, {len(robot.joints)} joints")
         for text in remarks:
@@ -67,7 +67,7 @@ def _read(source: str) -> tuple[Robot, list[str]]:
         return read.robot, list(read.remarks)
     if suffix == ".csv":
         robot = robot_from_dh(load_dh(source), Path(source).stem, source)
-        return robot, ["DH tables tell no masses, limits and soles: add those that the robot has"]
+        return robot, ["DH tables hold no masses, limits and soles: add those that the robot has"]
     return load_robot(source), []
 
 

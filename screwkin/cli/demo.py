@@ -15,7 +15,7 @@ from screwkin.analysis.validate import Validation
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder
 from screwkin.cli.output import aligned, print_json, remark, silent
-from screwkin.cli.simulation import Wish, simulate
+from screwkin.cli.simulation import Wish, simulate_to_files
 from screwkin.cli.virtual_play import played_to_virtual
 from screwkin.cli.walk import chosen_gait, command_of, make_trajectory, write_report
 from screwkin.errors import MissingDependencyError
@@ -27,7 +27,7 @@ from screwkin.model.table import load_robot
 from screwkin.report.numbers import balance_numbers, validation_numbers
 from screwkin.report.pictures import Saved, save_servo_pictures
 
-Tell = Callable[[str], None]
+Show = Callable[[str], None]
 
 
 def demo(
@@ -47,38 +47,38 @@ def demo(
     Takes well under a minute: the servos are virtual, in simulated time. Exit code 3 if the robot does not
     walk as planned.
     """
-    tell = _say if not as_json else remark if sys.stderr.isatty() else silent
+    show = _say if not as_json else remark if sys.stderr.isatty() else silent
     name = robot or robot_names()[0]
     table = load_robot(name)
     gait = gait or default_gait(table.name)
     chosen = chosen_gait(gait, [], None)
     with output_folder(output, "demo", table.name) as folder:
-        _tell_robot(tell, table)
+        _show_robot(show, table)
         facts = facts_of(table)
-        _tell_mechanism(tell, facts)
-        _tell_gait(tell, chosen, steps)
+        _show_mechanism(show, facts)
+        _show_gait(show, chosen, steps)
         command = command_of(name, gait, steps, [], None)
         account = make_trajectory(table, chosen, steps, command, folder)
-        tell(
+        show(
             f"   The loops close to {account.max_closure:.0e} m; rates and accelerations by Davies' method.\n"
         )
-        tell(
+        show(
             "4. The zero-moment point (ZMP), from the dynamics of all links: where the floor's force acts\n"
-            "   It must stay inside the soles that bear. GCoM is the centre of mass, projected on the floor."
+            "   It must stay inside the soles in contact. GCoM is the centre of mass, projected on the floor."
         )
-        tell(aligned(balance_numbers(account), "   ") + "\n")
-        tell("5. The simulation: bodies, motors and contacts decide")
+        show(aligned(balance_numbers(account), "   ") + "\n")
+        show("5. The simulation: bodies, motors and contacts decide")
         npz = folder / "trajectory.npz"
-        told: dict[str, Any] = {}
+        play: dict[str, Any] = {}
 
         def servos(check: Validation) -> Sequence[Saved]:
-            tell(aligned(validation_numbers(check), "   ") + "\n")
-            tell(
+            show(aligned(validation_numbers(check), "   ") + "\n")
+            show(
                 "6. The servos, virtual and in simulated time: every frame goes through the gate and the bus"
             )
-            told.update(played_to_virtual(npz, name, folder / "play.npz"))
-            tell(aligned([(line,) for line in told["lines"]], "   ") + "\n")
-            return save_servo_pictures(account, folder, told["log"]) if "log" in told else ()
+            play.update(played_to_virtual(npz, name, folder / "play.npz"))
+            show(aligned([(line,) for line in play["lines"]], "   ") + "\n")
+            return save_servo_pictures(account, folder, play["log"]) if "log" in play else ()
 
         commands = [
             command,
@@ -87,20 +87,20 @@ def demo(
         ]
         wish = Wish(video=True, commands=commands, more=servos)
         try:
-            check = simulate(account, folder, folder / "validation.json", wish)
+            check = simulate_to_files(account, folder, folder / "validation.json", wish)
         except MissingDependencyError:
             page = write_report(account, folder)
             remark(f"The report stops before the simulation: {page}")
             raise
-        _tell_end(tell, folder, check.passed, check.reasons)
+        _show_end(show, folder, check.passed, check.reasons)
     if as_json:
         print_json(
             {
                 "robot": table.name,
                 "mobility": facts.mobility,
                 **check.to_dict(),
-                "packets": told.get("packets", 0),
-                "servos": told.get("servos"),
+                "packets": play.get("packets", 0),
+                "servos": play.get("servos"),
                 "folder": str(folder),
             }
         )
@@ -111,45 +111,45 @@ def _say(text: str) -> None:
     print(text, flush=True)
 
 
-def _tell_robot(tell: Tell, robot: Robot) -> None:
-    tell(f"1. The robot: {robot.description}, {float(robot.mass):.3f} kg")
-    tell("   is a table of screws, one per joint: an axis s through a point s0 in the zero pose. One limb:")
+def _show_robot(show: Show, robot: Robot) -> None:
+    show(f"1. The robot: {robot.description}, {float(robot.mass):.3f} kg")
+    show("   is a table of screws, one per joint: an axis s through a point s0 in the zero pose. One limb:")
     limb = robot.limbs[0] if robot.limbs else None
     joints = [robot.joints[i] for i in robot.path_to(limb.link)] if limb else list(robot.joints[:6])
     rows = [(j.name, _triple(j.screw.s, "g"), _triple(j.screw.s0, ".4f")) for j in joints]
-    tell(aligned([("joint", "s", "s0 [m]"), *rows], "     ") + "\n")
+    show(aligned([("joint", "s", "s0 [m]"), *rows], "     ") + "\n")
 
 
 def _triple(vector: Iterable[Scalar], form: str) -> str:
     return "(" + ", ".join(format(float(c), form) for c in vector) + ")"
 
 
-def _tell_mechanism(tell: Tell, facts: Facts) -> None:
+def _show_mechanism(show: Show, facts: Facts) -> None:
     mechanism = facts.mechanism
     rows, columns = facts.network_shape
-    tell("2. The closed mechanism: virtual chains tie waist, feet and hands to the floor")
-    tell(
+    show("2. The closed mechanism: virtual chains tie waist, feet and hands to the floor")
+    show(
         f"   {columns} couplings, {len(mechanism.links)} links, {len(mechanism.circuit_matrix)} circuits, "
         f"mobility {facts.mobility}\n"
         f"   network matrix {rows} x {columns} of rank {facts.rank}, cond(Ns) = {facts.condition:.0f}"
     )
-    tell(
+    show(
         f"   {len(mechanism.primary)} couplings impose, {len(mechanism.secondary)} follow: "
         f"all {len(facts.robot.joints)} real joints are solved at once.\n"
     )
 
 
-def _tell_gait(tell: Tell, gait: Gait, steps: int) -> None:
-    tell(f"3. The gait {gait.name}: {gait.description}")
-    tell(
+def _show_gait(show: Show, gait: Gait, steps: int) -> None:
+    show(f"3. The gait {gait.name}: {gait.description}")
+    show(
         f"   {steps} steps of {gait.Tc:g} s, waist at {1e3 * gait.waist_height:g} mm, swings lift "
         f"{1e3 * gait.lift:g} mm."
     )
 
 
-def _tell_end(tell: Tell, folder: Path, passed: bool, reasons: tuple[str, ...]) -> None:
-    tell("It walks: passed." if passed else "It does not walk as planned:")
+def _show_end(show: Show, folder: Path, passed: bool, reasons: tuple[str, ...]) -> None:
+    show("It walks: passed." if passed else "It does not walk as planned:")
     for reason in reasons:
-        tell(f"  {reason}")
-    tell(f"The report with all pictures: {folder / 'report.html'}")
-    tell(f"The film: {folder / 'walk.gif'}")
+        show(f"  {reason}")
+    show(f"The report with all pictures: {folder / 'report.html'}")
+    show(f"The film: {folder / 'walk.gif'}")

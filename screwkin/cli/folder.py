@@ -15,20 +15,20 @@ from screwkin.files import make_folder
 def output_folder(out: Path | None, verb: str, robot: str) -> Iterator[Path]:
     """The folder ``out``, or a new one ``runs/<time>-<verb>-<robot>``; writable, or nothing is computed.
 
-    Folders made for a block that fails are removed again while they are empty.
+    Folders created for a block that fails are removed again while they are empty.
 
     Raises:
         OutputError: it cannot be created or written to.
     """
     folder = _fresh(verb, robot) if out is None else out
-    made = [path for path in (folder, *folder.parents) if not path.exists()]
+    created = [path for path in (folder, *folder.parents) if not path.exists()]
     try:
         yield make_folder(folder)
     except BaseException:
-        for path in made:
+        for path in created:
             try:
                 path.rmdir()
-            except OSError:  # it holds something, or was never made
+            except OSError:  # it holds something, or was never created
                 break
         raise
 

@@ -39,8 +39,8 @@ def ik(
             {"method": name, "iterations": iterations, "milliseconds": milliseconds}
             for name, (iterations, milliseconds) in PAPER_TABLE_5.items()
         ]
-        told = {"rows": [asdict(row) for row in study.rows], "notes": study.notes, "paper": paper}
-        print_json({"robot": study.robot, "limb": study.limb, **told})
+        content = {"rows": [asdict(row) for row in study.rows], "notes": study.notes, "paper": paper}
+        print_json({"robot": study.robot, "limb": study.limb, **content})
         return 0
     print(f"{study.robot}, {study.limb}: inverse kinematics")
     for data in dict.fromkeys(row.data for row in study.rows):

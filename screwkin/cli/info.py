@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from screwkin.analysis.facts import Facts, facts_of
-from screwkin.cli.options import AsJson, RobotName, place
+from screwkin.cli.options import AsJson, RobotName, point_of
 from screwkin.cli.output import aligned, print_json
 from screwkin.compiler.run import large_batches
 from screwkin.model.table import load_robot
@@ -26,18 +26,20 @@ def info(
     as_json: AsJson = False,
 ) -> int:
     """Mass, closed mechanism (couplings, circuits, mobility, network matrix) and conditioning of a robot."""
-    told = facts_of(load_robot(robot), posture, place(at, "--at") or (0.0, 0.0, 0.0), place(point, "--point"))
+    facts = facts_of(
+        load_robot(robot), posture, point_of(at, "--at") or (0.0, 0.0, 0.0), point_of(point, "--point")
+    )
     if as_json:
-        print_json(told.to_dict() | {"large_batches": large_batches()})
+        print_json(facts.to_dict() | {"large_batches": large_batches()})
     else:
-        print(_text(told))
+        print(_text(facts))
     return 0
 
 
-def _text(told: Facts) -> str:
-    robot, mechanism, data = told.robot, told.mechanism, told.to_dict()
+def _text(facts: Facts) -> str:
+    robot, mechanism, data = facts.robot, facts.mechanism, facts.to_dict()
     virtual = [name for name in mechanism.couplings if name not in robot.joint_names]
-    rows, columns = told.network_shape
+    rows, columns = facts.network_shape
     body = [
         ("mass", f"{data['mass']:.4f} kg"),
         ("bodies, joints", f"{data['bodies']}, {data['joints']} ({data['actuated_joints']} actuated)"),
@@ -54,12 +56,12 @@ def _text(told: Facts) -> str:
         ("network matrix N", f"{rows} x {columns}, rank {data['rank']}"),
         ("primary", _listed(mechanism.primary)),
         ("secondary", _listed(mechanism.secondary)),
-        ("cond(Ns)", f"{told.condition:.4g}"),
+        ("cond(Ns)", f"{facts.condition:.4g}"),
         ("large batches by", {"C": "compiled C", "numpy": "NumPy (no C compiler found)"}[large_batches()]),
     ]
     limbs = [
         (limb.limb, f"{limb.sigma:.4f}", f"NEAR A SINGULARITY: {limb.cause}" if limb.near else "regular")
-        for limb in told.limbs
+        for limb in facts.limbs
     ]
     parts = [
         f"{robot.name}: {robot.description}",
@@ -68,7 +70,7 @@ def _text(told: Facts) -> str:
         aligned(closed, "  "),
     ]
     if limbs:
-        parts += ["smallest singular value, made dimensionless by the robot's size", aligned(limbs, "  ")]
+        parts += ["smallest singular value, dimensionless by the robot's size", aligned(limbs, "  ")]
     return "\n".join(parts)
 
 

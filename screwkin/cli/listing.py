@@ -11,11 +11,11 @@ from screwkin.cli.output import aligned, print_json
 
 def list_tables(kind: str, names: Sequence[str], find: Callable[[str], Path], as_json: bool) -> int:
     """Print the bundled files of a kind; ``kind`` is also the table that holds the description."""
-    told = {name: _description(find(name), kind) for name in names}
+    described = {name: _description(find(name), kind) for name in names}
     if as_json:
-        print_json({"names": list(told), "descriptions": told})
+        print_json({"names": list(described), "descriptions": described})
     else:
-        print(aligned(list(told.items())))
+        print(aligned(list(described.items())))
     return 0
 
 

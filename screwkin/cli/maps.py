@@ -33,7 +33,7 @@ Pictures = Annotated[bool, typer.Option("--plots/--no-plots", help="Draw the pic
 
 @dataclass(frozen=True)
 class MapResult:
-    """What a verb found: arrays for its ``.npz``, JSON data, a title with rows, and pictures by file name."""
+    """The result of a verb: arrays for ``.npz``, JSON data, a title with rows, and pictures by file name."""
 
     arrays: Mapping[str, np.ndarray[Any, Any]]
     data: Mapping[str, Any]
@@ -42,32 +42,32 @@ class MapResult:
     pictures: Mapping[str, Callable[[], Any]]
 
 
-def made_maps(
-    verb: str, robot: Robot, make: Callable[[], MapResult], plots: bool, output: Path | None, as_json: bool
+def run_maps(
+    verb: str, robot: Robot, compute: Callable[[], MapResult], plots: bool, output: Path | None, as_json: bool
 ) -> int:
-    """Make maps, write them as ``VERB.npz`` and pictures, and tell them."""
+    """Compute maps, write them as ``VERB.npz`` and pictures, and print them."""
     with output_folder(output, verb, robot.name) as folder:
-        found = make()
+        result = compute()
         with atomic_write_bytes(folder / f"{verb}.npz") as file:
-            file.write(npz_bytes(found.arrays))
+            file.write(npz_bytes(result.arrays))
         if plots:
-            _draw(found, folder)
+            _draw(result, folder)
     if as_json:
-        print_json({**found.data, "folder": str(folder)})
+        print_json({**result.data, "folder": str(folder)})
     else:
-        print(found.title)
-        print(aligned(found.rows, "  "))
+        print(result.title)
+        print(aligned(result.rows, "  "))
         print(f"files in {folder}")
     return 0
 
 
-def _draw(found: MapResult, folder: Path) -> None:
+def _draw(result: MapResult, folder: Path) -> None:
     from screwkin.report.style import save_figure, styled
 
     with progress_bar("pictures") as done, styled():
-        for count, (name, picture) in enumerate(found.pictures.items()):
+        for count, (name, picture) in enumerate(result.pictures.items()):
             save_figure(picture(), folder / name)
-            done((count + 1) / len(found.pictures))
+            done((count + 1) / len(result.pictures))
 
 
 def reached_maps(

@@ -13,7 +13,7 @@ from screwkin.errors import InputError
 RobotName = Annotated[
     str, typer.Argument(metavar="ROBOT", help="A bundled robot's name, or the path of a table.")
 ]
-TrajectoryPath = Annotated[Path, typer.Argument(metavar="TRAJ", help="A trajectory.npz, as walk makes it.")]
+TrajectoryPath = Annotated[Path, typer.Argument(metavar="TRAJ", help="A trajectory.npz, as walk writes it.")]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
 OutputFolder = Annotated[
     Path | None,
@@ -33,12 +33,12 @@ def settings(assignments: list[str]) -> dict[str, str]:
         if not (equals and key and value):
             raise InputError(f"--set {text!r} is no assignment; write --set key=value, such as --set Tc=1.2")
         if key in values:
-            raise InputError(f"--set {key} is given twice: {values[key]} and {value}; give it once")
+            raise InputError(f"--set {key} is given twice: {values[key]} and {value}; once is enough")
         values[key] = value
     return values
 
 
-def place(text: str | None, option: str) -> tuple[float, float, float] | None:
+def point_of(text: str | None, option: str) -> tuple[float, float, float] | None:
     """Three finite numbers written ``X,Y,Z``.
 
     Raises:
@@ -49,7 +49,7 @@ def place(text: str | None, option: str) -> tuple[float, float, float] | None:
     try:
         x, y, z = (float(part) for part in text.split(","))
     except ValueError:
-        raise InputError(f"{option} {text!r} is no place; write three numbers in m, as 50,0,0") from None
+        raise InputError(f"{option} {text!r} is no point; write three numbers in m, as 50,0,0") from None
     if not all(map(math.isfinite, (x, y, z))):
         raise InputError(f"{option} {text!r} holds NaN or infinity; write three finite numbers in m")
     return x, y, z

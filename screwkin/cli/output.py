@@ -52,7 +52,7 @@ def aligned(rows: Sequence[Sequence[Any]], indent: str = "") -> str:
 
 @contextmanager
 def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
-    """A bar on stderr while it is a terminal, else nothing; gives a function that takes the share done."""
+    """A bar on stderr while it is a terminal, else nothing; yields a function that takes the share done."""
     if not sys.stderr.isatty():
         yield lambda share: None
         return

@@ -13,7 +13,7 @@ from screwkin.analysis.replay import replayed
 from screwkin.analysis.validate import Criteria, Validation
 from screwkin.cli.folder import output_folder
 from screwkin.cli.output import aligned, print_json, remark
-from screwkin.cli.simulation import Wish, print_verdict, simulate
+from screwkin.cli.simulation import Wish, print_verdict, simulate_to_files
 from screwkin.report.numbers import validation_numbers
 from screwkin.report.pictures import save_servo_pictures
 from screwkin.servo.log import load_log
@@ -27,11 +27,11 @@ def replay(trajectory: Path, log: Path, wish: Wish, output: Path | None, as_json
 
     Writes replay.json, pictures and report.html into the folder ``replay`` beside the log; the verdict that
     ``send`` asks for is not touched. The motors of the simulation enforce what was measured, so their torque
-    is told, but not judged.
+    is reported, but not judged.
     """
-    loaded, told = load_trajectory(trajectory), load_log(log)
+    loaded, played = load_trajectory(trajectory), load_log(log)
     robot = recorded_robot(loaded, str(trajectory))
-    planned, motion = replayed(robot, loaded, told)
+    planned, motion = replayed(robot, loaded, played)
     account = account_of(robot, planned)
     away = float(np.degrees(np.abs(motion.q - planned.q).max()))
     facts = {
@@ -48,9 +48,9 @@ def replay(trajectory: Path, log: Path, wish: Wish, output: Path | None, as_json
             commands=[line for line in commands if line],
             motion=motion,
             criteria=Criteria(torque_share=np.inf),
-            more=lambda check: save_servo_pictures(account, folder, told) if wish.plots else (),
+            more=lambda check: save_servo_pictures(account, folder, played) if wish.plots else (),
         )
-        check = simulate(account, folder, folder / VERDICT, wish)
+        check = simulate_to_files(account, folder, folder / VERDICT, wish)
     if planned.samples < loaded.samples:
         remark(
             f"warning: the log ends at {planned.duration:.2f} of {loaded.duration:.2f} s: judged up to there"
@@ -58,11 +58,11 @@ def replay(trajectory: Path, log: Path, wish: Wish, output: Path | None, as_json
     if as_json:
         print_json({"robot": robot.name, **facts, **check.to_dict()})
     else:
-        _tell(check, facts, folder)
+        _print(check, facts, folder)
     return 0 if check.passed else 3
 
 
-def _tell(check: Validation, facts: dict[str, object], folder: Path) -> None:
+def _print(check: Validation, facts: dict[str, object], folder: Path) -> None:
     print(
         f"{facts['log']}: joints as measured, {facts['replayed_s']:.2f} s in {check.engine}; up to "
         f"{facts['max_deviation_deg']:.1f} deg from the plan"

@@ -33,7 +33,7 @@ def reproduce(
 ) -> int:
     """Measure every table and figure of a paper again: the printed value beside ours, and why they differ.
 
-    Makes rows.json, and README.md and report.html with the figures drawn again. Takes minutes.
+    Writes rows.json, and README.md and report.html with the figures drawn again. Takes minutes.
     """
     paper = load_paper(name)
     check_paper(paper)
@@ -44,52 +44,52 @@ def reproduce(
     bench = Bench(paper.robot, paper.changes)
     with output_folder(output, "reproduce", paper.name) as folder:
         with progress_bar("measuring") as done:
-            found = measured(paper, bench, done)
-        rows = [line.to_dict() for line in found.lines]
+            result = measured(paper, bench, done)
+        rows = [line.to_dict() for line in result.lines]
         with atomic_write(folder / "rows.json") as file:
             file.write(
                 json.dumps(plain({"rows": rows}), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
             )
         if plots:
-            _draw(found, bench, folder, _command(name, output))
+            _draw(result, bench, folder, _command(name, output))
     if as_json:
         print_json({"paper": paper.name, "rows": rows, "folder": str(folder)})
     else:
-        print(_text(found))
+        print(_text(result))
         print(f"files in {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}")
     return 0
 
 
-def _draw(found: Reproduction, bench: Bench, folder: Path, command: str) -> None:
+def _draw(result: Reproduction, bench: Bench, folder: Path, command: str) -> None:
     from screwkin.papers.page import draw_pictures, write_pages
 
     with progress_bar("pictures") as done:
-        pictures = draw_pictures(found.paper, bench, folder, done)
-    write_pages(found, pictures, folder, command, _versions())
+        pictures = draw_pictures(result.paper, bench, folder, done)
+    write_pages(result, pictures, folder, command, _versions())
 
 
 def _command(name: str, output: Path | None) -> str:
-    """The command line that makes the same pages again."""
+    """The command line that writes the same pages again."""
     return shlex.join(["screwkin", "reproduce", name, *([] if output is None else ["-o", str(output)])])
 
 
 def _versions() -> str:
     """Versions of what computes."""
-    told = [f"Python {platform.python_version()}"]
+    parts = [f"Python {platform.python_version()}"]
     for package in _TRACED:
         try:
-            told.append(f"{package} {version(package)}")
+            parts.append(f"{package} {version(package)}")
         except PackageNotFoundError:
             if package == "screwkin":
                 from screwkin import __version__
 
-                told.append(f"screwkin {__version__}")
-    return ", ".join(told)
+                parts.append(f"screwkin {__version__}")
+    return ", ".join(parts)
 
 
-def _text(found: Reproduction) -> str:
-    parts = [found.paper.title]
-    for section in found.sections:
+def _text(result: Reproduction) -> str:
+    parts = [result.paper.title]
+    for section in result.sections:
         start = f"{section.section.place}: "
         rows = [
             (
@@ -106,7 +106,7 @@ def _text(found: Reproduction) -> str:
                 f"{start}{section.section.title}",
                 aligned([("", "paper", "ours", ""), *rows], "  "),
             ]
-    differing = [f"  {line.item}: {line.note}" for line in found.lines if line.agrees is False]
+    differing = [f"  {line.item}: {line.note}" for line in result.lines if line.agrees is False]
     if differing:
         parts += ["", "where they differ", *differing]
-    return "\n".join([*parts, "", found.summary])
+    return "\n".join([*parts, "", result.summary])

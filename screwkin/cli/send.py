@@ -13,18 +13,18 @@ import typer
 
 from screwkin.analysis.readiness import Ready, ready
 from screwkin.cli.folder import output_folder
+from screwkin.cli.injected import Faults, FormerFaults, Seed, injected_faults
 from screwkin.cli.options import AsJson, OutputFolder, TrajectoryPath
 from screwkin.cli.output import print_json, progress_bar, remark
-from screwkin.cli.troubles import Seed, Troubles, troubles_of
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.model.robot import Robot
 from screwkin.servo.budget import ADAPTER, budget
 from screwkin.servo.bus import Bus, open_line
 from screwkin.servo.gate import Bounds
-from screwkin.servo.player import Frames, Outcome, Player, PlaySettings, State, describe, frames_of
+from screwkin.servo.player import Frames, Player, PlayOutcome, PlaySettings, State, describe, frames_of
 from screwkin.servo.servo_map import ServoMap
 from screwkin.servo.virtual.bus import SimulatedClock, VirtualBus
-from screwkin.servo.virtual.faults import Trouble
+from screwkin.servo.virtual.faults import InjectedFault
 from screwkin.servo.virtual.robot import virtual_servos
 
 _STATES: tuple[State, ...] = ("hold", "limp")
@@ -45,7 +45,8 @@ def send(
     on_fault: Annotated[str, typer.Option(help="After a fault: hold or limp.")] = "hold",
     at_end: Annotated[str, typer.Option(help="After the last frame: hold or limp.")] = "hold",
     rs485: Annotated[bool, typer.Option("--rs485", help="Let the kernel switch direction.")] = False,
-    trouble: Troubles = None,
+    inject_fault: Faults = None,
+    trouble: FormerFaults = None,
     seed: Seed = 0,
     output: OutputFolder = None,
     as_json: AsJson = False,
@@ -56,12 +57,12 @@ def send(
     code 4 where the trajectory is refused, or a fault stopped it; 130 where it was interrupted.
     """
     if port and virtual:
-        raise InputError("--port and --virtual are two buses; give one of them")
+        raise InputError("--port and --virtual are two buses; choose one")
     if go and not (port or virtual):
         raise InputError("--go needs a bus: --port /dev/ttyUSB0, or --virtual")
-    if trouble and not virtual:
-        raise InputError("--trouble is for virtual servos; give --virtual with it")
-    troubles = troubles_of(trouble)
+    faults = injected_faults(inject_fault, trouble)
+    if faults and not virtual:
+        raise InputError("--inject-fault is for virtual servos; add --virtual")
     may = ready(trajectory, robot or None)
     settings = PlaySettings(
         rate=rate, torque=torque, far=_distance(far), on_fault=_state(on_fault), at_end=_state(at_end)
@@ -81,15 +82,15 @@ def send(
         "reads_per_frame": carried.reads(rate),
     }
     if not go:
-        _tell_dry(trajectory, frames, bounds, facts, as_json)
+        _print_dry(trajectory, frames, bounds, facts, as_json)
         return 0
     with output_folder(output, "send", may.robot.name) as folder:
-        bus = _real_bus(servos, port, rs485) if port else virtual_bus(may.robot, troubles, seed)
+        bus = _real_bus(servos, port, rs485) if port else virtual_bus(may.robot, faults, seed)
         outcome = played(bus, may, settings, folder / "play.npz", {"port": port or "virtual"})
-    return _tell(outcome, facts | {"log": str(folder / "play.npz")}, bounds, as_json)
+    return _print_outcome(outcome, facts | {"log": str(folder / "play.npz")}, bounds, as_json)
 
 
-def played(bus: Bus, may: Ready, settings: PlaySettings, log: Path, told: Mapping[str, Any]) -> Outcome:
+def played(bus: Bus, may: Ready, settings: PlaySettings, log: Path, facts: Mapping[str, Any]) -> PlayOutcome:
     """Play on a bus, close it, and save the log whatever happens once the servos move.
 
     Args:
@@ -97,13 +98,13 @@ def played(bus: Bus, may: Ready, settings: PlaySettings, log: Path, told: Mappin
         may: what to play.
         settings: how.
         log: path of its file.
-        told: what its ``meta`` holds besides.
+        facts: what its ``meta`` holds besides.
     """
     meta = {
         "robot": may.robot.name,
         "trajectory_sha256": may.trajectory.sha256,
         "rate": settings.rate,
-        **told,
+        **facts,
     }
     with _stop_on_signal() as stopped, progress_bar("playing") as done:
         player = Player(bus, may.robot, settings, stopped, done)
@@ -121,17 +122,17 @@ def _real_bus(servos: ServoMap, port: str, rs485: bool) -> Bus:
     return Bus(open_line(port, servos.baud, rs485), servos.protocol, servos.baud)
 
 
-def virtual_bus(robot: Robot, troubles: Sequence[Trouble] = (), seed: int = 0) -> Bus:
+def virtual_bus(robot: Robot, faults: Sequence[InjectedFault] = (), seed: int = 0) -> Bus:
     """Virtual servos of the robot in its posture ``home``, or at zero, on a simulated clock."""
     servos, clock = ServoMap.of(robot), SimulatedClock()
-    made = virtual_servos(robot, return_delay=_RETURN_DELAY)
-    line = VirtualBus(made, clock, servos.baud, troubles, seed, adapter=ADAPTER)
+    mounted = virtual_servos(robot, return_delay=_RETURN_DELAY)
+    line = VirtualBus(mounted, clock, servos.baud, faults, seed, adapter=ADAPTER)
     return Bus(line, servos.protocol, servos.baud, clock)
 
 
 @contextmanager
 def _stop_on_signal() -> Iterator[Any]:
-    """Gives a function that tells whether Ctrl-C or a wish to end has come, instead of an exception."""
+    """Yields a function that says whether Ctrl-C or a wish to end has come, instead of an exception."""
     asked: list[int] = []
 
     def ask(number: int, frame: FrameType | None) -> None:
@@ -145,7 +146,7 @@ def _stop_on_signal() -> Iterator[Any]:
             signal.signal(number, handler)
 
 
-def _tell_dry(path: Path, frames: Frames, bounds: Bounds, facts: dict[str, Any], as_json: bool) -> None:
+def _print_dry(path: Path, frames: Frames, bounds: Bounds, facts: dict[str, Any], as_json: bool) -> None:
     if as_json:
         print_json(
             {"frames": len(frames.q), "late_frames": 0, "max_tracking_error": None, "faults": [], **facts}
@@ -160,10 +161,10 @@ def _tell_dry(path: Path, frames: Frames, bounds: Bounds, facts: dict[str, Any],
     )
 
 
-def _tell(outcome: Outcome, facts: dict[str, Any], bounds: Bounds, as_json: bool) -> int:
-    told = describe(outcome, bounds.ids)
+def _print_outcome(outcome: PlayOutcome, facts: dict[str, Any], bounds: Bounds, as_json: bool) -> int:
+    message = describe(outcome, bounds.ids)
     if as_json:
-        print_json({**outcome.to_dict(), **facts, "message": told})
+        print_json({**outcome.to_dict(), **facts, "message": message})
     else:
         print(
             f"{outcome.frames} frames sent, {outcome.late_frames} late; largest tracking error "
@@ -171,9 +172,9 @@ def _tell(outcome: Outcome, facts: dict[str, Any], bounds: Bounds, as_json: bool
         )
     if not outcome.faults:
         if not as_json:
-            remark(told)
+            remark(message)
         return 0
-    remark(f"error: {told}")
+    remark(f"error: {message}")
     return _INTERRUPTED if outcome.faults[0].kind == "interrupted" else _REFUSED
 
 
@@ -186,5 +187,5 @@ def _state(text: str) -> State:
 
 def _distance(far: float) -> float:
     if not far > 0.0:
-        raise InputError(f"--far {far!r} is no distance; give rad above 0, such as 1")
+        raise InputError(f"--far {far!r} is no distance; expected rad above 0, such as 1")
     return far

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from screwkin.analysis.account import Account
-from screwkin.analysis.engines import ENGINES, Engine, Yielding
+from screwkin.analysis.engines import ENGINES, Engine, SimulatedCompliance
 from screwkin.analysis.validate import Criteria, Validation
 from screwkin.analysis.validate import validate as validated
 from screwkin.cli.output import plain, progress_bar, remark
@@ -29,8 +29,8 @@ FEWEST, MOST = 30, 120
 class Wish:
     """What a simulation is to be: engine, a window, a film, pictures and page; commands for the page.
 
-    gives: what yields; see ``validate``. motion: what the joints do instead of the trajectory; criteria: what
-    a walk must keep to; more: draws further pictures once the verdict is written.
+    compliance: see ``validate``. motion: what the joints do instead of the trajectory; criteria: what
+    a walk must satisfy; more: draws further pictures once the verdict is written.
     """
 
     engine: str = "pybullet"
@@ -38,13 +38,13 @@ class Wish:
     video: bool = False
     plots: bool = True
     commands: Sequence[str] = ()
-    gives: Yielding = field(default_factory=Yielding)
+    compliance: SimulatedCompliance = field(default_factory=SimulatedCompliance)
     motion: Trajectory | None = None
     criteria: Criteria | None = None
     more: Callable[[Validation], Sequence[Saved]] = lambda check: ()
 
 
-def simulate(account: Account, folder: Path, verdict: Path, wish: Wish) -> Validation:
+def simulate_to_files(account: Account, folder: Path, verdict: Path, wish: Wish) -> Validation:
     """Simulate a trajectory, write the verdict, then film, pictures and report.
 
     Args:
@@ -67,7 +67,7 @@ def simulate(account: Account, folder: Path, verdict: Path, wish: Wish) -> Valid
             gui=wish.gui,
             camera=camera,
             criteria=wish.criteria,
-            gives=wish.gives,
+            compliance=wish.compliance,
             progress=done,
             motion=wish.motion,
         )

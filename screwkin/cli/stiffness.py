@@ -11,7 +11,7 @@ import typer
 
 from screwkin.analysis.map_arrays import deflection_arrays
 from screwkin.analysis.stiffness_maps import DeflectionMap, stiffness_maps
-from screwkin.cli.maps import Heights, LimbName, MapResult, Pictures, Resolution, made_maps, reached_maps
+from screwkin.cli.maps import Heights, LimbName, MapResult, Pictures, Resolution, reached_maps, run_maps
 from screwkin.cli.options import AsJson, OutputFolder, RobotName
 from screwkin.cli.output import progress_bar
 from screwkin.compliance.springs import joint_stiffness
@@ -42,16 +42,16 @@ def stiffness(
     output: OutputFolder = None,
     as_json: AsJson = False,
 ) -> int:
-    """How far a swinging foot yields under the robot's weight, all over its workspace, in single support.
+    """Deflection of a swinging foot under the robot's weight, all over its workspace, in single support.
 
-    Files: stiffness.npz and pictures, one of all heights and one for each. For maps at unit stiffness give
-    --stiffness 1.
+    Files: stiffness.npz and pictures, one of all heights and one for each. For maps at unit stiffness
+    use --stiffness 1.
     """
     table = load_robot(robot)
     joint_stiffness(table, k)  # refused before the workspace is computed
     method: Method = "nonlinear" if nonlinear else "linear"
 
-    def make() -> MapResult:
+    def compute() -> MapResult:
         places = reached_maps(table, limb, heights, resolution)
         with progress_bar("deflections") as done:
             maps = stiffness_maps(table, places, k, method, support, posture, done)
@@ -59,7 +59,7 @@ def stiffness(
         data = stiffness_data(table, maps)
         return MapResult(deflection_arrays(maps), data, title, _rows(maps), _pictures(table, maps))
 
-    return made_maps("stiffness", table, make, plots, output, as_json)
+    return run_maps("stiffness", table, compute, plots, output, as_json)
 
 
 def stiffness_data(robot: Robot, maps: Sequence[DeflectionMap]) -> dict[str, Any]:
@@ -83,14 +83,14 @@ def stiffness_data(robot: Robot, maps: Sequence[DeflectionMap]) -> dict[str, Any
 def _rows(maps: Sequence[DeflectionMap]) -> list[tuple[str, ...]]:
     rows: list[tuple[str, ...]] = [("height", "area", "median", "largest", "x", "y", "z")]
     for one in maps:
-        told = one.summary()
+        numbers = one.summary()
         rows.append(
             (
                 f"{1e3 * one.place.height:g} mm",
                 f"{1e4 * one.place.area:.1f} cm²",
-                f"{told['median_mm']:.2f} mm",
-                f"{told['max_mm']:.2f} mm",
-                *(f"{told[f'{axis}_mm'][0]:.2f} to {told[f'{axis}_mm'][1]:.2f} mm" for axis in "xyz"),
+                f"{numbers['median_mm']:.2f} mm",
+                f"{numbers['max_mm']:.2f} mm",
+                *(f"{numbers[f'{axis}_mm'][0]:.2f} to {numbers[f'{axis}_mm'][1]:.2f} mm" for axis in "xyz"),
             )
         )
     return rows

@@ -27,9 +27,9 @@ def table(
 ) -> int:
     """The screw table of a robot: for every joint its axis s through s0 in the zero pose, and its pitch."""
     if latex + markdown + as_json > 1:
-        raise InputError("--latex, --markdown and --json exclude each other; give one of them")
+        raise InputError("--latex, --markdown and --json exclude each other; choose one")
     if limb is not None and not symbolic:
-        raise InputError("--limb chooses what --symbolic derives; give --symbolic too")
+        raise InputError("--limb chooses what --symbolic derives; add --symbolic")
     loaded = load_robot(robot, symbolic)
     style: Style = "latex" if latex else "markdown" if markdown else "text"
     if as_json:

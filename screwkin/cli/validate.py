@@ -10,12 +10,12 @@ from typing import Annotated
 import typer
 
 from screwkin.analysis.account import account_of, recorded_robot
-from screwkin.analysis.engines import Yielding
+from screwkin.analysis.engines import SimulatedCompliance
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, TrajectoryPath
 from screwkin.cli.output import aligned, print_json
 from screwkin.cli.replay import replay
-from screwkin.cli.simulation import Wish, print_verdict, simulate
+from screwkin.cli.simulation import Wish, print_verdict, simulate_to_files
 from screwkin.cli.simulation import engine as engine_named
 from screwkin.errors import InputError, OutputError
 from screwkin.files import make_folder
@@ -61,25 +61,31 @@ def validate(
     """Simulate a trajectory and give a verdict: validation.json beside it, plots, report.html.
 
     Without -o all files go beside the trajectory, with --log into replay/ beside the log. Exit code 3 if it
-    does not pass; the reasons are told.
+    does not pass; the reasons are listed.
     """
     engine_named(engine)
-    gives = _yielding(compliant, k, sole_stiffness, repeat)
+    compliance = _compliance(compliant, k, sole_stiffness, repeat)
     if log is not None:
-        if gives != Yielding():
+        if compliance != SimulatedCompliance():
             raise InputError(
                 "--log replays servos that moved; it goes without --compliant and --sole-stiffness"
             )
         return replay(trajectory, log, Wish(engine, gui, video, plots), output, as_json)
     loaded = load_trajectory(trajectory)
     account = account_of(recorded_robot(loaded, str(trajectory)), loaded)
-    gives.for_trajectory(account.robot, loaded)  # refused before anything is written
+    compliance.for_trajectory(account.robot, loaded)  # refused before anything is written
     beside = _beside(trajectory)
-    words = ["screwkin", "validate", str(trajectory), *_changes(engine, gives, k), *(["--video"] * video)]
+    words = [
+        "screwkin",
+        "validate",
+        str(trajectory),
+        *_changes(engine, compliance, k),
+        *(["--video"] * video),
+    ]
     commands = _commands(str(loaded.meta.get("command", "")), words)
-    wish = Wish(engine, gui, video, plots, commands, gives)
+    wish = Wish(engine, gui, video, plots, commands, compliance)
     with output_folder(output or beside, "validate", account.robot.name) as folder:
-        check = simulate(account, folder, beside / "validation.json", wish)
+        check = simulate_to_files(account, folder, beside / "validation.json", wish)
     if as_json:
         print_json({"robot": account.robot.name, **check.to_dict()})
     else:
@@ -101,22 +107,26 @@ def _beside(trajectory: Path) -> Path:
         ) from None
 
 
-def _yielding(compliant: bool, k: float | None, sole_stiffness: float | None, repeat: bool) -> Yielding:
-    """What gives way, as a command line tells it."""
+def _compliance(
+    compliant: bool, k: float | None, sole_stiffness: float | None, repeat: bool
+) -> SimulatedCompliance:
+    """The compliance that a command line asks for."""
     if not compliant and (repeat or k is not None):
         raise InputError(f"{'--repeat' if repeat else '--stiffness'} is of elastic servos; add --compliant")
-    return Yielding(Compliance(k) if compliant else None, sole_stiffness, repeat)
+    return SimulatedCompliance(Compliance(k) if compliant else None, sole_stiffness, repeat)
 
 
-def _changes(engine: str, gives: Yielding, k: float | None) -> list[str]:
+def _changes(engine: str, compliance: SimulatedCompliance, k: float | None) -> list[str]:
     """The options that ask for another simulation than the usual one."""
     words = ["--engine", engine] if engine != "pybullet" else []
-    words += ["--compliant"] if gives.servos is not None else []
+    words += ["--compliant"] if compliance.servos is not None else []
     words += [] if k is None else ["--stiffness", f"{k:g}"]
-    words += [] if gives.sole_stiffness is None else ["--sole-stiffness", f"{gives.sole_stiffness:g}"]
-    return words + (["--repeat"] if gives.repeat else [])
+    words += (
+        [] if compliance.sole_stiffness is None else ["--sole-stiffness", f"{compliance.sole_stiffness:g}"]
+    )
+    return words + (["--repeat"] if compliance.repeat else [])
 
 
-def _commands(made: str, words: Sequence[str]) -> list[str]:
-    """The command that made the trajectory, as it recorded it, and this one."""
-    return [line for line in (made, shlex.join(words)) if line]
+def _commands(planned: str, words: Sequence[str]) -> list[str]:
+    """The command that planned the trajectory, as recorded in it, and this one."""
+    return [line for line in (planned, shlex.join(words)) if line]

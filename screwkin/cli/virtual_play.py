@@ -18,12 +18,12 @@ def played_to_virtual(trajectory: Path, robot: str, log: Path) -> dict[str, Any]
     """Play a trajectory to virtual servos in simulated time, if it may be sent.
 
     Returns:
-        lines: what to tell about it; packets: number of packets that the servos heard; servos: the outcome as
-        JSON data, None where nothing was played; log: the record of the play, if there is one.
+        lines: what to print; packets: number of packets that the servos heard; servos: the outcome as JSON
+        data, None where nothing was played; log: the record of the play, if there is one.
     """
     if not load_robot(robot).servos:
         return {
-            "text": "The robot's table tells no [servos]: nothing to play to.",
+            "text": "The robot's table has no [servos]: nothing to play to.",
             "packets": 0,
             "servos": None,
         }

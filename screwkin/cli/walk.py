@@ -45,11 +45,11 @@ def walk(
     output: OutputFolder = None,
     as_json: AsJson = False,
 ) -> int:
-    """Make the trajectory of a gait: trajectory.npz, trajectory.csv, plots and report.html.
+    """Plan the trajectory of a gait: trajectory.npz, trajectory.csv, plots and report.html.
 
-    With --compensate also compensated/trajectory.npz, the commands for servos that yield, beside the plan.
+    With --compensate also compensated/trajectory.npz, the commands for compliant servos, beside the plan.
     Exit code 3 if a limb cannot reach, is singular or beyond a limit; the message names limb and time. A ZMP
-    outside the support polygon is told, but the trajectory is still made.
+    outside the support polygon is a warning; the trajectory is written all the same.
     """
     table = load_robot(robot)
     wanted = remedy(table, compensate, passes, k)
@@ -59,22 +59,22 @@ def walk(
     steps = chosen.steps if steps is None else steps
     command = command_of(robot, name, steps, assignments, rate)
     with output_folder(output, "walk", table.name) as folder:
-        account, told = _planned(table, chosen, steps, command), None
+        account, remedied = _planned(table, chosen, steps, command), None
         if wanted is not None:
             command = shlex.join([*shlex.split(command), *wanted.words])
-            told = compensated(table, account.trajectory, wanted, command, folder)
+            remedied = compensated(table, account.trajectory, wanted, command, folder)
         _save(account, folder)
-        if told is not None:
-            told.save()
+        if remedied is not None:
+            remedied.save()
         if plots:
             write_report(account, folder)
     if as_json:
-        extra = {} if told is None else {"compensation": told.to_dict()}
+        extra = {} if remedied is None else {"compensation": remedied.to_dict()}
         print_json({**walk_data(account), "gait": chosen.name, "folder": str(folder), **extra})
     else:
         _print_summary(account, chosen, folder)
-        if told is not None:
-            print(told.text())
+        if remedied is not None:
+            print(remedied.text())
     return 0
 
 
@@ -88,7 +88,7 @@ def chosen_gait(name: str, assignments: Sequence[str], rate: float | None) -> Ga
 
 
 def command_of(robot: str, gait: str, steps: int, assignments: Sequence[str], rate: float | None) -> str:
-    """The command line that makes the same trajectory again, wherever its files go."""
+    """The command line that plans the same trajectory again, wherever its files go."""
     words = ["screwkin", "walk", robot, "--gait", gait, "--steps", str(steps)]
     words += [word for text in assignments for word in ("--set", text)]
     words += [] if rate is None else ["--rate", f"{rate:g}"]
@@ -96,7 +96,7 @@ def command_of(robot: str, gait: str, steps: int, assignments: Sequence[str], ra
 
 
 def make_trajectory(robot: Robot, gait: Gait, steps: int, command: str, folder: Path) -> Account:
-    """Make a trajectory and write it as ``.npz`` and ``.csv``."""
+    """Plan a trajectory and write it as ``.npz`` and ``.csv``."""
     account = _planned(robot, gait, steps, command)
     _save(account, folder)
     return account
@@ -132,6 +132,6 @@ def _print_summary(account: Account, gait: Gait, folder: Path) -> None:
     if account.outside.any():
         remark(
             "warning: the ZMP leaves the support polygon: on the floor the robot would tip over "
-            "(screwkin validate tells)"
+            "(see screwkin validate)"
         )
     print(f"files in {folder}: {', '.join(sorted(path.name for path in folder.iterdir() if path.is_file()))}")

@@ -11,7 +11,7 @@ import numpy as np
 
 from screwkin.analysis.map_arrays import workspace_arrays
 from screwkin.analysis.workspace import WorkspaceMap
-from screwkin.cli.maps import Heights, LimbName, MapResult, Pictures, Resolution, made_maps, reached_maps
+from screwkin.cli.maps import Heights, LimbName, MapResult, Pictures, Resolution, reached_maps, run_maps
 from screwkin.cli.options import AsJson, OutputFolder, RobotName
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
@@ -33,13 +33,13 @@ def workspace(
     """
     table = load_robot(robot)
 
-    def make() -> MapResult:
+    def compute() -> MapResult:
         maps = reached_maps(table, limb, heights, resolution)
         title = f"{table.name}, {maps[0].limb}: reach with the tip held level, grid {1e3 * resolution:g} mm"
         data = workspace_data(table, maps)
         return MapResult(workspace_arrays(maps), data, title, _rows(maps), _pictures(table, maps))
 
-    return made_maps("workspace", table, make, plots, output, as_json)
+    return run_maps("workspace", table, compute, plots, output, as_json)
 
 
 def workspace_data(robot: Robot, maps: Sequence[WorkspaceMap]) -> dict[str, Any]:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
-
 from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.se3 import Pose, Rotation, Twist, Vector
+from screwkin.compiler.program import Recorder
 
 
 def identifier(*parts: str) -> str:
@@ -14,15 +13,15 @@ def identifier(*parts: str) -> str:
     return text if text[:1].isalpha() else f"k_{text}"
 
 
-def pose_input(tape: Tape, name: str) -> Pose:
+def pose_input(recorder: Recorder, name: str) -> Pose:
     """An input (4, 4) as a pose; its last row is not read."""
-    T = tape.input(name, 4, 4)
+    T = recorder.input(name, 4, 4)
     return Pose(Rotation(*(Vector(T[c], T[4 + c], T[8 + c]) for c in range(3))), Vector(T[3], T[7], T[11]))
 
 
-def twist_input(tape: Tape, name: str) -> Twist:
+def twist_input(recorder: Recorder, name: str) -> Twist:
     """An input (6,) as a twist [omega; v]."""
-    x = tape.input(name, 6)
+    x = recorder.input(name, 6)
     return Twist(Vector(*x[:3]), Vector(*x[3:]))
 
 
@@ -30,16 +29,3 @@ def matrix(pose: Pose) -> list[Scalar]:
     """The sixteen scalars of a pose as a 4 x 4 matrix, row by row."""
     rows = zip(pose.R.x, pose.R.y, pose.R.z, pose.p, strict=True)
     return [x for row in [*rows, (0, 0, 0, 1)] for x in row]
-
-
-class Tape(Protocol):
-    """Where a formula gets its inputs and leaves its outputs."""
-
-    def title(self, name: str, about: str) -> None:
-        """An identifier, and what is computed, a sentence."""
-
-    def input(self, name: str, *shape: int) -> list[Scalar]:
-        """The scalars of an input array, flat in row-major order."""
-
-    def output(self, name: str, values: Any, *shape: int) -> None:
-        """An output array: scalars, or records whose leaves are taken in order."""

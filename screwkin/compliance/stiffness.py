@@ -25,7 +25,7 @@ from screwkin.compliance.supported import Supported
 from screwkin.dynamics.newton_euler import GRAVITY
 from screwkin.errors import InputError, NoSolutionError, ShapeError, SingularError, UnknownNameError
 from screwkin.kinematics.positions import link_displacements
-from screwkin.model.robot import Robot
+from screwkin.model.robot import Robot, refuse_closures
 from screwkin.model.state import State
 
 Method = Literal["linear", "nonlinear"]
@@ -193,12 +193,7 @@ def cartesian_stiffness(
 
 def _flat(robot: Robot, state: State) -> tuple[Array, Array, tuple[int, ...]]:
     """Base poses (B, 4, 4), positions (B, n) and the batch's shape of a checked state."""
-    if robot.closures:
-        names = ", ".join(closure.name for closure in robot.closures)
-        raise InputError(
-            f"{robot.name} has closures ({names}); deflections and compliances are computed for trees only, "
-            "and no function computes those of closed loops yet"
-        )
+    refuse_closures(robot, "deflections", "no function computes those of closed loops yet")
     T, q = np.asarray(state.T_world_base, dtype=float), np.asarray(state.q, dtype=float)
     n = len(robot.joints)
     if T.shape[-2:] != (4, 4) or q.shape[-1:] != (n,):

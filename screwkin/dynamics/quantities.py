@@ -9,12 +9,13 @@ from screwkin.algebra.se3 import NO_TWIST, Pose, Twist, Vector
 from screwkin.dynamics import newton_euler
 from screwkin.dynamics.newton_euler import GRAVITY, Bodies
 from screwkin.dynamics.zmp import cart_table_zmp, zmp_from_wrench
-from screwkin.errors import InputError
 from screwkin.kinematics import mass
 from screwkin.kinematics.body import check_mass
 from screwkin.kinematics.formula import formula
 from screwkin.kinematics.kinds import Columns, Joints, Number
-from screwkin.model.robot import Robot
+from screwkin.model.robot import Robot, refuse_closures
+
+LOOPS = "secondary_rates of its closed_mechanism gives the loops' rates; forces in loops are not computed yet"
 
 
 @formula
@@ -75,7 +76,7 @@ def mass_matrix(robot: Robot, T_world_base: Pose, q: Joints) -> Columns:
 
     Source: Featherstone (2008), section 6.2.
     """
-    refuse_closures(robot, "the mass matrix")
+    refuse_closures(robot, "mass_matrix", LOOPS)
     return newton_euler.mass_matrix(Bodies.of(robot, T_world_base.R, q))
 
 
@@ -118,7 +119,7 @@ def inverse_dynamics(
 
     Source: Featherstone (2008), section 5.3.
     """
-    refuse_closures(robot, "inverse dynamics")
+    refuse_closures(robot, "inverse_dynamics", LOOPS)
     wrench, efforts = newton_euler.inverse_dynamics(
         Bodies.of(robot, T_world_base.R, q),
         qd,
@@ -212,17 +213,3 @@ def balance(
         "zmp": [zmp.x, zmp.y],
         "cart_table": [cart.x, cart.y],
     }
-
-
-def refuse_closures(robot: Robot, what: str) -> None:
-    """Refuse a robot with loops of its own where only its open tree would be seen.
-
-    Raises:
-        InputError: it has closures.
-    """
-    if robot.closures:
-        names = ", ".join(closure.name for closure in robot.closures)
-        raise InputError(
-            f"{what} of {robot.name} would be that of its open tree, without its closures ({names}). Solve "
-            "the loops for rates with secondary_rates; forces in loops are not computed yet"
-        )

@@ -22,7 +22,7 @@ from screwkin.ik import programs as limbs
 from screwkin.ik.closed import recognised
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.kinematics.serial_chain import SerialChain
-from screwkin.mechanism.tip_motion import follows, motion
+from screwkin.mechanism.tip_motion import motion_program
 from screwkin.model.robot import Robot
 
 TOLERANCE: Mapping[Real, float] = {"double": 1e-12, "float": 1e-5}
@@ -32,18 +32,6 @@ TOLERANCE: Mapping[Real, float] = {"double": 1e-12, "float": 1e-5}
 def _closed_limbs(robot: Robot) -> list[Program]:
     solved = [x.name for x in robot.limbs if recognised(SerialChain.of(robot, x.name))]
     return [limbs.limb_nearest(robot, name) for name in solved]
-
-
-def _rates(accelerations: bool) -> Callable[[Robot], list[Program]]:
-    def make(robot: Robot) -> list[Program]:
-        if not robot.limbs or not follows(robot, robot.joint_names):
-            raise InputError(
-                f"{robot.name}: rates follow limbs of six joints, or of three, that share none and have no "
-                "loops of their own; ask for tips, com or zmp"
-            )
-        return [motion.program(robot, accelerations)]
-
-    return make
 
 
 def _deflections(robot: Robot) -> list[Program]:
@@ -65,8 +53,8 @@ SHORT = {
 KINDS: Mapping[str, Callable[[Robot], list[Program]]] = {
     **{name: partial(programs, name=name) for name in QUANTITIES if name not in SHORT.values()},
     **{short: partial(programs, name=name) for short, name in SHORT.items()},
-    "rates": _rates(False),
-    "motion": _rates(True),
+    "rates": lambda robot: [motion_program(robot)],
+    "motion": lambda robot: [motion_program(robot, True)],
     "ik": _closed_limbs,
     "margin": lambda robot: [margin(robot)],
     "deflection": _deflections,

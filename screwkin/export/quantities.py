@@ -18,7 +18,9 @@ from screwkin.kinematics.body import (
 )
 from screwkin.kinematics.formula import Quantity
 from screwkin.mechanism.choice import closed_mechanism
+from screwkin.mechanism.network import coupling_screws
 from screwkin.mechanism.quantities import network_matrix, virtual_motion
+from screwkin.mechanism.tip_motion import joint_rates
 from screwkin.model.robot import Robot
 
 QUANTITIES: Mapping[str, Quantity] = {
@@ -38,6 +40,8 @@ QUANTITIES: Mapping[str, Quantity] = {
         balance,
         network_matrix,
         virtual_motion,
+        joint_rates,
+        coupling_screws,
     )
 }
 """Every quantity that a formula defines. A new one needs its definition and its row here."""

@@ -70,8 +70,8 @@ class Problem:
         Raises:
             NoSolutionError: the robot cannot follow.
         """
-        made = walk(self.robot, self.layout.dress(self.gait, x), self.steps)
-        return Course(made.com[:, :2] - made.zmp, made.zmp, made.q[:, self.joints])
+        walked = walk(self.robot, self.layout.dress(self.gait, x), self.steps)
+        return Course(walked.com[:, :2] - walked.zmp, walked.zmp, walked.q[:, self.joints])
 
     def derivative(self, x: Array, at: Course) -> Course:
         """Derivatives (T, ..., size) of all parts of a course, by differences of whole walks."""
@@ -88,6 +88,13 @@ def balance_problem(
 ) -> tuple[Problem, Array]:
     """The problem of a gait, and the coefficients (size,) nearest to its own waist path.
 
+    Args:
+        robot: the robot.
+        gait: where the search begins.
+        layout: which coefficients the path has.
+        steps: length of the walk.
+        least: positions [rad] by joint that must not be undercut.
+
     Raises:
         UnknownNameError: ``least`` names no joint of the robot.
         NoSolutionError: the robot cannot follow that nearest path.
@@ -96,7 +103,7 @@ def balance_problem(
         if name not in robot.joint_names:
             raise UnknownNameError("joint", name, robot.joint_names)
     x = layout.fit(gait, steps)
-    made = walk(robot, layout.dress(gait, x), steps)
+    walked = walk(robot, layout.dress(gait, x), steps)
     stretch = max(0.5 * float(np.hypot(gait.stride, gait.side)), _SHORTEST)
     problem = Problem(
         robot,
@@ -106,27 +113,27 @@ def balance_problem(
         tuple(robot.joint_names.index(name) for name in least),
         np.array(list(least.values()), dtype=float),
         np.where(layout.forward, stretch, 1.0),
-        support_edges(robot, made),
+        support_edges(robot, walked),
     )
     return problem, x
 
 
-def support_edges(robot: Robot, made: Trajectory) -> Edges:
+def support_edges(robot: Robot, walked: Trajectory) -> Edges:
     """Edges of the support polygon in every sample.
 
     A sample next to a lift-off or landing is given the smaller polygon of the two: so a ZMP that stays
     inside in the samples is inside at the very moment of the change, between them.
     """
-    contact = made.contact
+    contact = walked.contact
     both = contact.copy()
     both[1:] &= contact[:-1]
     both[:-1] &= contact[1:]
-    bears = np.where(both.any(axis=1, keepdims=True), both, contact)
-    soles = soles_on_floor(robot, made.feet, made.T_world_tip)
+    standing = np.where(both.any(axis=1, keepdims=True), both, contact)
+    soles = soles_on_floor(robot, walked.feet, walked.T_world_tip)
     known: dict[bytes, tuple[Array, Array]] = {}
     found = []
-    for outline, bearing in zip(soles, bears, strict=True):
-        points = np.round(outline[bearing].reshape(-1, 2), 9)
+    for outline, carrying in zip(soles, standing, strict=True):
+        points = np.round(outline[carrying].reshape(-1, 2), 9)
         key = points.tobytes()
         if key not in known:
             known[key] = _edges(convex_hull(points))

@@ -11,7 +11,11 @@ from screwkin.model.toml import read_text, read_toml
 
 
 def default_gait(robot: str) -> str:
-    """The bundled gait of a robot unless told otherwise: the first named ``ROBOT-…``, else ``walk``."""
+    """The bundled gait of a robot if none is chosen: the first named ``ROBOT-…``, else ``walk``.
+
+    Args:
+        robot: name of a robot.
+    """
     own = [name for name in gait_names() if name.startswith(f"{robot}-")]
     return own[0] if own else "walk"
 
@@ -19,9 +23,12 @@ def default_gait(robot: str) -> str:
 def load_gait(name_or_path: str | Path) -> Gait:
     """A bundled gait by its name, or the gait of a file.
 
+    Args:
+        name_or_path: such as ``"walk"`` or ``"my/gait.toml"``.
+
     Raises:
         UnknownNameError: no such gait; the message lists the bundled ones.
-        GaitError: the file cannot be read or is wrong; all faults are told at once.
+        GaitError: the file cannot be read or is wrong; all faults are named at once.
     """
     path = find_gait(name_or_path)
     return parse_gait(read_text(path, GaitError), str(path))
@@ -30,7 +37,11 @@ def load_gait(name_or_path: str | Path) -> Gait:
 def parse_gait(text: str, path: str = "<text>") -> Gait:
     """The gait of a TOML text.
 
+    Args:
+        text: TOML; the comments of the bundled gaits explain its keys.
+        path: where it comes from, for messages.
+
     Raises:
-        GaitError: the text is no TOML, or the gait is wrong; all faults are told at once.
+        GaitError: the text is no TOML, or the gait is wrong; all faults are named at once.
     """
     return gait_from_dict(read_toml(text, path, GaitError), path)

@@ -1,4 +1,4 @@
-"""Footholds along a path, the swings between them, and which feet bear."""
+"""Footholds along a path, the swings between them, and which feet are in contact."""
 
 from __future__ import annotations
 
@@ -52,6 +52,11 @@ def footholds(gait: Gait, stance: Stance, steps: int) -> tuple[Foothold, ...]:
     a step ahead of the waist, as the walking paper (eq. 19-20); ``close`` lands the leading foot (even n)
     at P(n + 2) and the closing one beside it at P(n + 1); ``parallel`` starts at P(0) and lands at P(n + 1),
     the last swing beside the foot that stands.
+
+    Args:
+        gait: its path and how feet pass each other.
+        stance: distance of the feet from the middle [m].
+        steps: number of swings.
     """
     path, lead = path_of(gait), first_side(gait)
 
@@ -95,9 +100,15 @@ def swing_splines(gait: Gait) -> tuple[Any, Any]:
 def feet_motion(
     gait: Gait, stance: Stance, holds: tuple[Foothold, ...], phase: Motion
 ) -> tuple[dict[str, Motion], NDArray[np.bool_]]:
-    """Motion of the feet, x, y, z, yaw (T, 4) by name, and which of them bear, (T, feet).
+    """Motion of the feet, x, y, z, yaw (T, 4) by name, and which of them are in contact, (T, feet).
 
-    A foot that bears stands on its foothold to the last bit, with no rate and no acceleration.
+    A foot in contact stands on its foothold to the last bit, with no rate and no acceleration.
+
+    Args:
+        gait: its swings.
+        stance: the feet.
+        holds: from ``footholds``.
+        phase: (T,) [steps].
     """
     steps = max(hold.step for hold in holds) + 1
     n = np.clip(np.floor(phase.value).astype(int), 0, steps - 1)
@@ -106,7 +117,7 @@ def feet_motion(
     liftoff, landing = gait.channels["foot_height"].at[[0, -1]]
     landed = fraction.value >= landing - _EDGE
     in_air = (fraction.value > liftoff + _EDGE) & ~landed
-    motions, bears = {}, []
+    motions, contact = {}, []
     for foot in stance.feet:
         own = [hold for hold in holds if hold.foot == foot.name]
         places = np.array([[hold.x, hold.y, hold.yaw] for hold in own])
@@ -116,8 +127,8 @@ def feet_motion(
         moving = swings[n] & in_air
         stands = np.where(landed[:, None], target, origin)
         motions[foot.name] = _swung(origin, target - origin, progress, height, moving, stands)
-        bears.append(~moving)
-    return motions, np.column_stack(bears)
+        contact.append(~moving)
+    return motions, np.column_stack(contact)
 
 
 def _swung(

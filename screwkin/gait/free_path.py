@@ -77,7 +77,7 @@ def _bumps(coefficients: Array, span: float, p: Array, order: int) -> Array:
 
 
 def read_free_waist(table: Mapping[str, Any], faults: list[Fault]) -> dict[str, tuple[float, ...]]:
-    """Coefficients of the table ``[waist]``, after telling its faults; empty where it is absent."""
+    """Coefficients of the table ``[waist]``, after adding its faults; empty where it is absent."""
     row, path = "[waist]", {}
     for key, raw in table.items():
         if key not in FREE_WAIST_KEYS:

@@ -18,6 +18,12 @@ def hands_motion(gait: Gait, stance: Stance, waist: Motion, phase: Motion) -> di
     (walking paper, eq. 16-17, g = (-1)^n); ``hand_raise`` [m] lifts both above ``hand_drop`` below the
     shoulder (eq. 18). Without these channels the hands rest there. Periodic C2 cubics: they overshoot the
     paper's held ends by 4 % (1 mm), where holding them would let the acceleration jump.
+
+    Args:
+        gait: its channels of the hands.
+        stance: shoulders in the waist frame [m].
+        waist: x, y, z, yaw (T, 4) in the world [m and rad].
+        phase: (T,) [steps].
     """
     swing, lift = (_channel(gait, name, phase) for name in ("hand_forward", "hand_raise"))
     none = swing * 0.0

@@ -1,6 +1,6 @@
 """Key points of a gait's channels: when (fraction of Tc) and what (a number or a formula), with their checks.
 
-A channel is told over one step, n even or odd alike, or over a whole cycle of two steps (its last time is
+A channel covers one step, n even or odd alike, or a whole cycle of two steps (its last time is
 then 2). How it goes on from step to step is its kind:
 
 - ``swing``: only for the swinging foot, constant before and after;
@@ -56,7 +56,7 @@ class Channel:
 def read_channel(
     name: str, raw: Any, numbers: Mapping[str, float | None], faults: list[Fault]
 ) -> Channel | None:
-    """The channel of a gait file's table ``[channel.NAME]``, or None after telling its faults.
+    """The channel of a gait file's table ``[channel.NAME]``, or None after adding its faults.
 
     Args:
         name: of the channel, one of ``CHANNELS``.
@@ -84,7 +84,7 @@ def read_channel(
 def _evaluated(
     row: str, key: str, raw: Any, numbers: Mapping[str, float | None], faults: list[Fault]
 ) -> list[float] | None:
-    """Numbers of a list of formulas, or None after telling every faulty one."""
+    """Numbers of a list of formulas, or None after adding the fault of each."""
     if not isinstance(raw, Sequence) or isinstance(raw, str) or len(raw) < 2:
         found = "missing" if raw is None else f"{raw!r} is no list of at least two key points"
         faults.append(Fault(row, key, found, "Write a list such as [0, 0.5, 1]"))

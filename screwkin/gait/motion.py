@@ -64,6 +64,22 @@ def level_twist(rate: Array) -> Array:
     return twist
 
 
+def carried_frame(body: Motion, frame: Pose) -> tuple[Array, Array, Array]:
+    """World pose (T, 4, 4), twist (T, 6) and its time derivative (T, 6) of a frame fixed in a level body.
+
+    Args:
+        body: x, y, z, yaw (T, 4) in the world.
+        frame: its pose in the body's frame [m].
+    """
+    place, still = np.array([float(c) for c in frame.p]), np.zeros((len(body.value), 3))
+    origin = carried_point(body, Motion(still + place, still, still))
+    pose, twist, acceleration = level_pose(body), level_twist(body.rate), level_twist(body.acceleration)
+    pose[:, :3, :3] = pose[:, :3, :3] @ as_array(frame.R).astype(float)
+    pose[:, :3, 3] = origin.value
+    twist[:, 3:], acceleration[:, 3:] = origin.rate, origin.acceleration
+    return pose, twist, acceleration
+
+
 def carried_point(body: Motion, point: Motion) -> Motion:
     """World motion (T, 3) of a point that moves in a level body.
 

@@ -64,13 +64,13 @@ def optimise_waist(
         robot: the robot.
         gait: a geometric gait; its own waist path, key points or free, is where the search begins.
         steps: length of the walk that is optimised. Three steps hold a start, a step of the steady walk and
-            a stop, of which longer walks are made.
+            a stop, of which longer walks consist.
         margin: least distance of the ZMP inside the support polygon [m].
-        least: positions [rad] by joint that must be kept, such as the bend of the knees.
+        least: positions [rad] by joint that must not be undercut, such as the bend of the knees.
         shape: numbers of coefficients by the keys of the table ``[waist]``.
         span: of the bumps at start and stop [steps], at most 1.
         iterations: linear programs at most.
-        report: is told every iteration.
+        report: called with every iteration.
 
     Returns:
         The gait, its coefficients rounded to six digits.

@@ -1,4 +1,4 @@
-"""The plan of a walk: what the virtual chains are told to do, sample by sample, in task space."""
+"""The plan of a walk: what the virtual chains impose, sample by sample, in task space."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.errors import Fault, GaitError, InputError
 from screwkin.gait.footsteps import Foothold, feet_motion, footholds
 from screwkin.gait.hands import hands_motion
-from screwkin.gait.motion import Motion, level_pose, level_twist
+from screwkin.gait.motion import Motion, carried_frame, level_pose, level_twist
 from screwkin.gait.path import path_of
 from screwkin.gait.record import Gait
 from screwkin.gait.soles import check_soles
@@ -23,6 +23,7 @@ from screwkin.gait.timing import Timing
 from screwkin.gait.waist import waist_path
 
 MOST_SAMPLES = 1_000_000  # a longer plan would fill the memory of a small computer
+LEAST_SHOWN = 2  # samples of a swing below which a trajectory does not show that the foot leaves the floor
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,18 +78,20 @@ def plan(gait: Gait, stance: Stance, steps: int) -> Plan:
 
     Raises:
         InputError: ``steps`` is no whole number above 0.
-        GaitError: another kind of gait, a swing below the floor, too many samples, or numbers too large.
+        GaitError: another kind of gait, a swing below the floor, too many or too few samples, or numbers too
+            large.
         NoSolutionError: the feet overlap.
 
     Source: walking paper (docs/papers.md, A), eq. 16-24, generalised to arcs and to stepping sideways.
     """
     steps = whole_steps(steps)
     if gait.kind != "geometric":
-        found = f"a gait of kind {gait.kind!r} is not made of key points alone"
+        found = f"a gait of kind {gait.kind!r} does not consist of key points alone"
         raise GaitError(_where(gait), [Fault("[gait]", "kind", found, 'Give one of kind "geometric"')])
+    check_rate(gait)
     timing = Timing(gait.Tc, steps, gait.ramp)
     time = sample_times(gait, timing)
-    with np.errstate(all="ignore"):  # absurd sizes are told below, in words
+    with np.errstate(all="ignore"):  # absurd sizes are refused below, in words
         phase = timing.phase(time)
         progress, side = waist_path(gait, steps).motions(phase)
         waist = path_of(gait).follow(progress, side, gait.waist_height)
@@ -108,6 +111,16 @@ def plan_around(
 ) -> Plan:
     """The plan whose waist moves as given, x, y, z, yaw (T, 4), with feet and hands by the gait's phase (T,).
 
+    Args:
+        gait: swings, hands and path.
+        stance: feet, soles and shoulders of the robot.
+        steps: number of steps, at least 1.
+        time: (T,) [s].
+        phase: (T,) [steps].
+        waist: x, y, z, yaw (T, 4) of the waist in the world [m and rad].
+        boundaries: (steps + 1,) [s].
+        notes: what the reader of the plan should know.
+
     Raises:
         GaitError: a swing below the floor, or numbers too large. NoSolutionError: the feet overlap.
     """
@@ -118,24 +131,25 @@ def plan_around(
     _check_finite(gait, {"waist": waist, **feet, **hands})
     with np.errstate(all="ignore"):
         gap = check_soles(gait, stance, feet, time)
+        base = carried_frame(waist, stance.T_waist_base)
     return Plan(
         gait=gait,
         steps=steps,
-        time=_kept(time),
-        phase=_kept(phase.value),
-        T_world_base=_kept(level_pose(waist)),
-        base_twist=_kept(level_twist(waist.rate)),
-        base_acceleration=_kept(level_twist(waist.acceleration)),
+        time=_read_only(time),
+        phase=_read_only(phase.value),
+        T_world_base=_read_only(base[0]),
+        base_twist=_read_only(base[1]),
+        base_acceleration=_read_only(base[2]),
         T_world_tip=_each(feet, lambda foot: level_pose(foot)),
         tip_twist=_each(feet, lambda foot: level_twist(foot.rate)),
         tip_acceleration=_each(feet, lambda foot: level_twist(foot.acceleration)),
         hand_position=_each(hands, lambda hand: hand.value),
         hand_velocity=_each(hands, lambda hand: hand.rate),
         hand_acceleration=_each(hands, lambda hand: hand.acceleration),
-        contact=_kept(contact),
+        contact=_read_only(contact),
         feet=tuple(foot.name for foot in stance.feet),
         footholds=holds,
-        boundaries=_kept(boundaries),
+        boundaries=_read_only(boundaries),
         sole_gap=gap,
         notes=notes,
     )
@@ -143,6 +157,10 @@ def plan_around(
 
 def sample_times(gait: Gait, timing: Timing) -> Array:
     """Sample times of a walk (T,) [s].
+
+    Args:
+        gait: its rate.
+        timing: its duration.
 
     Raises:
         GaitError: fewer than two samples, or more than ``MOST_SAMPLES``.
@@ -154,6 +172,25 @@ def sample_times(gait: Gait, timing: Timing) -> Array:
             _where(gait), [Fault("[gait]", "rate", found, f"Keep them between 2 and {MOST_SAMPLES:,}")]
         )
     return timing.samples(gait.rate)
+
+
+def check_rate(gait: Gait) -> None:
+    """Refuse a rate that does not show the swings.
+
+    Args:
+        gait: its rate, ``Tc``, and the times of liftoff and landing.
+
+    Raises:
+        GaitError: fewer than ``LEAST_SHOWN`` samples while a foot is in the air.
+    """
+    liftoff, landing = gait.channels["foot_height"].at[[0, -1]]
+    swing = float(landing - liftoff) * gait.Tc
+    if swing * gait.rate < LEAST_SHOWN:
+        found = f"{gait.rate:g} per second is {swing * gait.rate:.2g} samples in a swing of {swing:.3g} s"
+        rate, Tc = LEAST_SHOWN / swing, LEAST_SHOWN * gait.Tc / (swing * gait.rate)
+        upwards = f"raise rate to {np.ceil(rate):g} or more, or Tc to {np.ceil(1e4 * Tc) / 1e4:g} s or more"
+        fix = f"This rate cannot show the swing: {upwards}"
+        raise GaitError(_where(gait), [Fault("[gait]", "rate", found, fix)])
 
 
 def whole_steps(steps: object) -> int:
@@ -187,7 +224,7 @@ def _notes(gait: Gait, timing: Timing) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _kept(array: Any) -> Any:
+def _read_only(array: Any) -> Any:
     """A read-only copy."""
     array = np.array(array)
     array.flags.writeable = False
@@ -195,4 +232,4 @@ def _kept(array: Any) -> Any:
 
 
 def _each(motions: Mapping[str, Motion], part: Any) -> Mapping[str, Array]:
-    return MappingProxyType({name: _kept(part(motion)) for name, motion in motions.items()})
+    return MappingProxyType({name: _read_only(part(motion)) for name, motion in motions.items()})

@@ -98,6 +98,10 @@ def follow_reference(gains: PreviewGains, reference: Array) -> CartMotion:
     """CoM motion that lets the ZMP follow a reference (T, k), starting at rest over its first value [m].
 
     Beyond its end the reference stays at its last value.
+
+    Args:
+        gains: from ``preview_gains``.
+        reference: wanted ZMP (T, 2) [m].
     """
     first = reference[0]
     wanted = np.concatenate([reference, np.repeat(reference[-1:], len(gains.G), axis=0)]) - first

@@ -1,10 +1,10 @@
 """The plan of a preview gait: a CoM motion for a ZMP that goes from foot to foot, and the waist to give it.
 
 Time falls into phases of Tc: the robot stands in the first and the last one, and swings once in each between.
-In the first ``dsp`` of a phase both feet bear, while the reference moves linearly to the sole that will bear.
-The CoM is that of all links. It has no fixed place in the waist, so the waist is found by Newton's method,
-for positions, rates and accelerations in turn. Source: Kajita et al. (2003); walking with the waist taken for
-the CoM (``com = "waist"``) is what the second paper does.
+In the first ``dsp`` of a phase both feet are in contact, while the reference moves linearly to the next
+supporting sole. The CoM is that of all links. It has no fixed place in the waist, so Newton's method solves
+for the waist, for positions, rates and accelerations in turn. Source: Kajita et al. (2003); walking with the
+waist taken for the CoM (``com = "waist"``) is what the second paper does.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from screwkin.gait.balance import ground_reaction
 from screwkin.gait.footsteps import Foothold, footholds, swing_side
 from screwkin.gait.motion import Motion, along
 from screwkin.gait.path import path_of
-from screwkin.gait.plan import Plan, plan_around, whole_steps
+from screwkin.gait.plan import Plan, check_rate, plan_around, whole_steps
 from screwkin.gait.preview import CartMotion, follow_reference, preview_gains
-from screwkin.gait.realise import differentiate, positions, stance_of
+from screwkin.gait.realise import differentiate, positions
 from screwkin.gait.record import Gait
 from screwkin.gait.stance import Stance
 from screwkin.kinematics.mass import center_of_mass
@@ -33,19 +33,19 @@ from screwkin.model.robot import Robot
 from screwkin.model.state import State
 
 SETTINGS = ("dsp", "horizon", "Qe", "Qx", "R")
-"""Numbers that a preview gait's file gives in ``[parameters]``."""
+"""Numbers of a preview gait's file in ``[parameters]``."""
 
 TRACKED = 1e-9
 """How closely the CoM follows its reference [m]."""
 
 
-def preview_plan(robot: Robot, mechanism: Mechanism, gait: Gait, steps: int) -> Plan:
+def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -> Plan:
     """The plan of a gait of kind ``preview``.
 
     Args:
-        robot: with two legs, soles and a ``home`` posture.
-        mechanism: its closed mechanism.
+        mechanism: of a robot with a ``home`` posture whose joints follow from base and tips.
         gait: ``dsp`` (fraction of Tc), ``horizon`` [s], ``Qe``, ``Qx``, ``R`` are its own parameters.
+        stance: feet, soles and shoulders of the robot.
         steps: number of swings, at least 1.
 
     Returns:
@@ -56,7 +56,7 @@ def preview_plan(robot: Robot, mechanism: Mechanism, gait: Gait, steps: int) -> 
     """
     steps = whole_steps(steps)
     settings = _settings(gait)
-    stance = stance_of(robot)
+    check_rate(gait)
     count = round((steps + 2) * gait.Tc * gait.rate)
     time = np.arange(count) / gait.rate
     phase = _phase(time, gait.Tc, steps)
@@ -72,25 +72,33 @@ def preview_plan(robot: Robot, mechanism: Mechanism, gait: Gait, steps: int) -> 
     if gait.com == "true":
         rest = np.zeros((1, 2))
         standing = around(CartMotion(reference[:1], rest, rest, reference[:1]), slice(1))
-        stand, q = _followed(robot, mechanism, standing, reference[:1])
-        height = _com(robot, stand, q)[0, 2]
+        stand, q = _followed(mechanism, standing, reference[:1])
+        height = _com(mechanism.robot, stand, q)[0, 2]
     gains = preview_gains(
         1 / gait.rate, height, settings["horizon"], settings["Qe"], settings["Qx"], settings["R"]
     )
     cart = follow_reference(gains, reference)
-    made = around(cart)
+    planned = around(cart)
     if gait.com == "waist":
-        return replace(made, notes=("the waist is taken for the CoM",))
-    return _tracked(robot, mechanism, made, cart)
+        return replace(planned, notes=("the waist is taken for the CoM",))
+    return _tracked(mechanism, planned, cart)
 
 
 def zmp_reference(gait: Gait, stance: Stance, holds: tuple[Foothold, ...], steps: int, time: Array) -> Array:
-    """Wanted ZMP (T, 2): at rest between the feet, else in the middle of the sole that bears [m]."""
+    """Wanted ZMP (T, 2): at rest between the feet, else in the middle of the supporting sole [m].
+
+    Args:
+        gait: of kind ``preview``.
+        stance: soles of the robot.
+        holds: from ``footholds``.
+        steps: number of swings.
+        time: (T,) [s].
+    """
     places = [0.5 * (_middle(stance, holds[0]) + _middle(stance, holds[1]))]
     stand = {hold.foot: hold for hold in holds[:2]}
     for n in range(steps):
-        bearing = stance.foot(-swing_side(gait, n))
-        places.append(_middle(stance, stand[bearing.name]))
+        supporting = stance.foot(-swing_side(gait, n))
+        places.append(_middle(stance, stand[supporting.name]))
         stand[holds[n + 2].foot] = holds[n + 2]
     first, second = stand.values()
     places.append(0.5 * (_middle(stance, first) + _middle(stance, second)))
@@ -165,41 +173,41 @@ def _waist(gait: Gait, cart: CartMotion, phase: Motion) -> Motion:
     return Motion(*columns)
 
 
-def _com(robot: Robot, made: Plan, q: Array) -> Array:
+def _com(robot: Robot, planned: Plan, q: Array) -> Array:
     """CoM of all links (T, 3) [m]."""
     D = link_displacements(robot, unstack(q))
-    return np.asarray(as_array(pose_from_array(made.T_world_base) @ center_of_mass(robot, D), (len(q),)))
+    return np.asarray(as_array(pose_from_array(planned.T_world_base) @ center_of_mass(robot, D), (len(q),)))
 
 
-def _followed(robot: Robot, mechanism: Mechanism, made: Plan, wanted: Array) -> tuple[Plan, Array]:
+def _followed(mechanism: Mechanism, planned: Plan, wanted: Array) -> tuple[Plan, Array]:
     """The plan with its waist moved until the CoM stands over ``wanted`` (T, 2), and its joint positions."""
-    q = positions(robot, mechanism, made).state.q
-    share = _share(robot, mechanism, made, q)
+    q = positions(mechanism, planned).state.q
+    share = _share(mechanism, planned, q)
     for _ in range(20):
-        error = wanted - _com(robot, made, q)[:, :2]
+        error = wanted - _com(mechanism.robot, planned, q)[:, :2]
         if np.abs(error).max() < TRACKED:
-            return made, q
-        made = _moved(made, _solved(share, error))
-        q = positions(robot, mechanism, made, q).state.q
+            return planned, q
+        planned = _moved(planned, _solved(share, error))
+        q = positions(mechanism, planned, q).state.q
     far = 1e3 * np.abs(error).max()
     raise NoSolutionError(f"the waist cannot bring the CoM to its reference; {far:.2g} mm are missing")
 
 
-def _tracked(robot: Robot, mechanism: Mechanism, made: Plan, cart: CartMotion) -> Plan:
+def _tracked(mechanism: Mechanism, planned: Plan, cart: CartMotion) -> Plan:
     """The plan whose CoM of all links follows the cart, in all three derivatives."""
-    made, q = _followed(robot, mechanism, made, cart.com)
-    share, none = _share(robot, mechanism, made, q), np.zeros_like(cart.com)
-    velocity, _ = _com_rates(robot, mechanism, made, q)
-    made = _driven(made, _solved(share, cart.velocity - velocity), none)
-    _, acceleration = _com_rates(robot, mechanism, made, q)
-    return _driven(made, none, _solved(share, cart.acceleration - acceleration))
+    planned, q = _followed(mechanism, planned, cart.com)
+    share, none = _share(mechanism, planned, q), np.zeros_like(cart.com)
+    velocity, _ = _com_rates(mechanism, planned, q)
+    planned = _driven(planned, _solved(share, cart.velocity - velocity), none)
+    _, acceleration = _com_rates(mechanism, planned, q)
+    return _driven(planned, none, _solved(share, cart.acceleration - acceleration))
 
 
-def _share(robot: Robot, mechanism: Mechanism, made: Plan, q: Array) -> Array:
+def _share(mechanism: Mechanism, planned: Plan, q: Array) -> Array:
     """How the CoM moves with the waist while the feet stay, (T, 2, 2): rates are linear in the waist's."""
     none = np.zeros((len(q), 2))
-    rest, _ = _com_rates(robot, mechanism, made, q)
-    pushed = [_com_rates(robot, mechanism, _driven(made, none + e, none), q)[0] for e in np.eye(2)]
+    rest, _ = _com_rates(mechanism, planned, q)
+    pushed = [_com_rates(mechanism, _driven(planned, none + e, none), q)[0] for e in np.eye(2)]
     return np.stack([moved - rest for moved in pushed], axis=-1)
 
 
@@ -207,22 +215,22 @@ def _solved(share: Array, wanted: Array) -> Array:
     return np.asarray(np.linalg.solve(share, wanted[..., None])[..., 0])
 
 
-def _moved(made: Plan, by: Array) -> Plan:
+def _moved(planned: Plan, by: Array) -> Plan:
     """The plan with its waist, and the hands that hang from it, moved (T, 2) [m]."""
-    T = made.T_world_base.copy()
+    T = planned.T_world_base.copy()
     T[:, :2, 3] += by
-    hands = {name: _added(p, by) for name, p in made.hand_position.items()}
-    return replace(made, T_world_base=T, hand_position=hands)
+    hands = {name: _added(p, by) for name, p in planned.hand_position.items()}
+    return replace(planned, T_world_base=T, hand_position=hands)
 
 
-def _driven(made: Plan, velocity: Array, acceleration: Array) -> Plan:
+def _driven(planned: Plan, velocity: Array, acceleration: Array) -> Plan:
     """The plan with velocities and accelerations (T, 2) added to waist and hands."""
     return replace(
-        made,
-        base_twist=_added(made.base_twist, velocity, 3),
-        base_acceleration=_added(made.base_acceleration, acceleration, 3),
-        hand_velocity={name: _added(v, velocity) for name, v in made.hand_velocity.items()},
-        hand_acceleration={name: _added(a, acceleration) for name, a in made.hand_acceleration.items()},
+        planned,
+        base_twist=_added(planned.base_twist, velocity, 3),
+        base_acceleration=_added(planned.base_acceleration, acceleration, 3),
+        hand_velocity={name: _added(v, velocity) for name, v in planned.hand_velocity.items()},
+        hand_acceleration={name: _added(a, acceleration) for name, a in planned.hand_acceleration.items()},
     )
 
 
@@ -232,12 +240,13 @@ def _added(array: Array, by: Array, at: int = 0) -> Array:
     return changed
 
 
-def _com_rates(robot: Robot, mechanism: Mechanism, made: Plan, q: Array) -> tuple[Array, Array]:
+def _com_rates(mechanism: Mechanism, planned: Plan, q: Array) -> tuple[Array, Array]:
     """Velocity and acceleration of the CoM (T, 2), with the joints that the plan asks for."""
-    motion = differentiate(mechanism, made, State(made.T_world_base, q))
-    T, qd = pose_from_array(made.T_world_base), unstack(motion.qd)
-    h = momentum(Bodies.of(robot, T.R, unstack(q)), qd, twist_from_array(made.base_twist))
+    robot = mechanism.robot
+    motion = differentiate(mechanism, planned, State(planned.T_world_base, q))
+    T, qd = pose_from_array(planned.T_world_base), unstack(motion.qd)
+    h = momentum(Bodies.of(robot, T.R, unstack(q)), qd, twist_from_array(planned.base_twist))
     velocity = as_array(h.f, (len(q),)) / robot.mass
-    twists = made.base_twist, made.base_acceleration
-    wrench = ground_reaction(robot, made.T_world_base, q, motion.qd, motion.qdd, *twists)[2]
+    twists = planned.base_twist, planned.base_acceleration
+    wrench = ground_reaction(robot, planned.T_world_base, q, motion.qd, motion.qdd, *twists)[2]
     return velocity[:, :2], wrench[:, 3:5] / robot.mass

@@ -1,7 +1,7 @@
 """The gait as a value: parameters and key points, checked and evaluated.
 
-A gait is made from a document, the content of its file as plain dictionaries; the document is kept, so that
-changing a parameter evaluates every formula again and ``to_dict`` tells all that is needed to make it anew.
+A gait comes from a document, the content of its file as plain dictionaries, which it holds: changing a
+parameter evaluates every formula again, and ``to_dict`` returns what makes the same gait.
 """
 
 from __future__ import annotations
@@ -57,13 +57,13 @@ _TABLES = ("gait", "parameters", "channel", "waist")
 
 @dataclass(frozen=True, eq=False)
 class Gait:
-    """A gait. Lengths in m, angles in rad, times in s; made by ``load_gait`` or ``gait_from_dict``.
+    """A gait. Lengths in m, angles in rad, times in s; from ``load_gait`` or ``gait_from_dict``.
 
     Tc: period of one step. stride, side, turn: displacement of a foot per swing, forward, to the left and
-    about the vertical. lift: height of a swing. waist_height: of the base above the floor. hand_drop: hands
+    about the vertical. lift: height of a swing. waist_height: of the waist above the floor. hand_drop: hands
     below their shoulders. sway: factor on the lateral motion of the waist. spread: added to each foot's
     distance from the middle. ramp: steps over which the gait starts and stops (0: at once). steps: how many,
-    unless told otherwise. rate: samples per second. footholds: ``alternate`` (each foot passes the other),
+    by default. rate: samples per second. footholds: ``alternate`` (each foot passes the other),
     ``close`` (one leads, the other closes up) or ``parallel`` (as alternate, but from feet side by side to
     feet side by side); first: the foot that swings first. com: what a preview gait steers, the ``true`` CoM
     of all links or, naively, the ``waist``.
@@ -120,10 +120,10 @@ class Gait:
                 fix = f"{near(key, valid)}Valid: {', '.join(valid)}; one entry of a list by its number: KEY.0"
                 faults.append(Fault("", key, "no such parameter", fix))
         where = self.path or f"gait {self.name}"
-        told = f"{where} with {', '.join(f'{key}={value}' for key, value in parameters.items())}"
+        where_with = f"{where} with {', '.join(f'{key}={value}' for key, value in parameters.items())}"
         if faults:
-            raise GaitError(told, faults)
-        return replace(gait_from_dict(document, told), path=where)
+            raise GaitError(where_with, faults)
+        return replace(gait_from_dict(document, where_with), path=where)
 
     def to_dict(self) -> dict[str, Any]:
         """All of the gait as JSON data; ``gait_from_dict`` makes the same gait of it."""
@@ -134,7 +134,7 @@ def gait_from_dict(document: Mapping[str, Any], path: str = "<gait>") -> Gait:
     """The gait of a document: tables ``gait``, ``parameters``, ``channel`` and ``waist``.
 
     Args:
-        document: as read from a gait file or made by ``Gait.to_dict``.
+        document: as read from a gait file or from ``Gait.to_dict``.
         path: of the file, for messages.
 
     Raises:

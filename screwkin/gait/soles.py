@@ -43,6 +43,12 @@ def check_soles(gait: Gait, stance: Stance, feet: dict[str, Motion], time: Array
 
     The swing foot counts as well: it passes too low to pass over the other.
 
+    Args:
+        gait: for the message.
+        stance: soles and bodies of the feet.
+        feet: x, y, z, yaw (T, 4) by name [m and rad].
+        time: (T,) [s].
+
     Raises:
         NoSolutionError: they overlap; the message names feet and time.
     """

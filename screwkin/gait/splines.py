@@ -14,7 +14,12 @@ from screwkin.algebra.arrays import Array
 
 
 def clamped_cubic(at: Array, value: Array) -> Any:
-    """Cubic C2 spline through key points, at rest at the first and the last; a scipy PPoly."""
+    """Cubic C2 spline through key points, at rest at the first and the last; a scipy PPoly.
+
+    Args:
+        at: key times (k,), increasing.
+        value: (k,).
+    """
     from scipy.interpolate import CubicSpline
 
     return CubicSpline(at, value, bc_type="clamped")
@@ -26,20 +31,24 @@ def minimum_jerk(at: Array, value: Array) -> Any:
     A key point that is merely passed on the way, its value strictly between its neighbours' ones, is left
     out: to rest there would cost jerk, and to pass through it a dive below the floor.
 
+    Args:
+        at: key times (k,), increasing.
+        value: (k,).
+
     Source: Flash and Hogan (1985), the motion of least integrated squared jerk between two rests.
     """
     from scipy.interpolate import PPoly
 
     step = np.diff(value)
-    kept = np.concatenate([[True], step[:-1] * step[1:] <= 0, [True]])
-    x, y = at[kept], value[kept]
+    turning = np.concatenate([[True], step[:-1] * step[1:] <= 0, [True]])
+    x, y = at[turning], value[turning]
     h, rise = np.diff(x), np.diff(y)
     none = np.zeros_like(h)
     return PPoly(np.stack([6 * rise / h**5, -15 * rise / h**4, 10 * rise / h**3, none, none, y[:-1]]), x)
 
 
 def held(spline: Any) -> Any:
-    """The spline of a swing made constant before its first and after its last key point, on [0, 1]."""
+    """The spline of a swing, constant before its first and after its last key point, on [0, 1]."""
     from scipy.interpolate import PPoly
 
     x, c = spline.x, spline.c

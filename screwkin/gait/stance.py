@@ -1,14 +1,23 @@
-"""What a gait must know of a robot: where its feet and shoulders are, and the outline of its soles."""
+"""What a gait must know of a robot: feet, soles and shoulders, and the waist that it steers."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
-from screwkin.errors import ShapeError
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import IDENTITY, Pose, Vector
+from screwkin.dynamics.support import sole_corners
+from screwkin.errors import InputError, ShapeError
+from screwkin.kinematics.landmarks import limb_root, waist_frame
+from screwkin.kinematics.positions import frame_pose, link_displacements
+from screwkin.model.robot import Limb, Robot
 
 LEFT, RIGHT = 1, -1
+_LEVEL = np.cos(np.deg2rad(1.0))
+"""Cosine of the angle by which a foot's z axis may lean off its sole's normal."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +35,7 @@ class Foot:
 
 @dataclass(frozen=True)
 class Hand:
-    """A hand: name of its tip, side, and its shoulder (x, y, z) in base axes from the base origin [m]."""
+    """A hand: name of its tip, side, and its shoulder (x, y, z) in the waist frame [m]."""
 
     name: str
     side: int
@@ -37,6 +46,8 @@ class Hand:
 class Stance:
     """The upright robot: distance of each foot from the middle [m], one foot per side, any hands.
 
+    T_waist_base: pose of the base frame in the waist frame, which is what a gait steers.
+
     Raises:
         ShapeError: not one foot per side, or a number that is wrong; all faults are named.
     """
@@ -44,6 +55,7 @@ class Stance:
     foot_y: float
     feet: tuple[Foot, ...]
     hands: tuple[Hand, ...] = ()
+    T_waist_base: Pose = IDENTITY
 
     def __post_init__(self) -> None:
         faults = []
@@ -68,3 +80,61 @@ class Stance:
     def foot(self, side: int) -> Foot:
         """The foot of a side."""
         return next(foot for foot in self.feet if foot.side == side)
+
+
+def stance_of(robot: Robot) -> Stance:
+    """What a gait must know of a robot, from its axes, tips and soles at the home posture.
+
+    Args:
+        robot: with a floating base, one leg on either side, and a ``home`` posture.
+
+    Raises:
+        InputError: a fixed base, no ``home`` posture, not one leg on either side, a leg without sole, or a
+            foot whose frame does not stand upright on its sole.
+    """
+    if robot.base != "floating":
+        raise InputError(f"robot {robot.name} has a fixed base; only one with a floating base can walk")
+    if "home" not in [posture.name for posture in robot.postures]:
+        raise InputError(f"robot {robot.name} has no posture 'home'; a walk needs one with bent knees")
+    D, back = link_displacements(robot, list(robot.posture("home").q)), waist_frame(robot).inverse
+    feet, hands, places = [], [], []
+    for limb in robot.limbs:
+        y = float((back @ frame_pose(robot, D, limb.tip).p).y)
+        side = LEFT if y > 0 else RIGHT
+        if limb.kind == "leg":
+            feet.append(Foot(limb.tip, side, _sole(robot, limb), _body(robot, limb)))
+            places.append(abs(y))
+        else:
+            x, y, z = back @ limb_root(robot, limb.name)
+            hands.append(Hand(limb.tip, side, (float(x), float(y), float(z))))
+    if sorted(foot.side for foot in feet) != [RIGHT, LEFT]:
+        raise InputError(f"robot {robot.name} has {len(feet)} legs; a walk needs one on either side")
+    return Stance(sum(places) / len(places), tuple(feet), tuple(hands), back)
+
+
+def _sole(robot: Robot, limb: Limb) -> tuple[tuple[float, float], ...]:
+    """Corners (x, y) of a leg's sole in the frame of its tip, whose z axis is the sole's normal [m]."""
+    corners = sole_corners(robot, limb.tip)
+    normal = _normal(corners)
+    if normal[2] < _LEVEL * np.linalg.norm(normal):
+        lean = np.degrees(np.arccos(np.clip(normal[2] / np.linalg.norm(normal), -1, 1)))
+        raise InputError(
+            f"robot {robot.name}: the z axis of {limb.tip} leans by {lean:.3g} deg off its sole's normal;"
+            f" a gait sets feet down by their frames: turn the frame of limb {limb.name} (x forward, z up)"
+        )
+    return tuple((float(x), float(y)) for x, y, _ in corners)
+
+
+def _normal(corners: Array) -> Array:
+    """Normal (3,) of a polygon (k, 3) that runs counter-clockwise about it; twice its area long."""
+    return np.asarray(np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0))
+
+
+def _body(robot: Robot, limb: Limb) -> tuple[tuple[float, float], ...]:
+    """Corners (x, y) of the boxes of a limb's last link, in the frame of its tip [m]."""
+    corners = [
+        limb.frame.inverse @ (box.center + Vector(a * box.size.x, b * box.size.y, c * box.size.z) * 0.5)
+        for box in robot.link(limb.link).boxes
+        for a, b, c in product((-1, 1), repeat=3)
+    ]
+    return tuple((float(corner.x), float(corner.y)) for corner in corners)

@@ -1,7 +1,7 @@
 """Time and phase: a gait that starts from rest and comes to rest again.
 
 The phase counts steps. Between start and stop it runs at one step per Tc; over the first and the last
-``ramp`` steps its speed follows a quintic smoothstep, so that everything told as a function of the phase
+``ramp`` steps its speed follows a quintic smoothstep, so that everything that is a function of the phase
 starts and stops with it, without a jump in acceleration or jerk.
 """
 

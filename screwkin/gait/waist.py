@@ -32,7 +32,11 @@ def waist_path(gait: Gait, steps: int) -> WaistPath:
 
     Free if the gait has coefficients for it, else C2 cubics through the key points of ``waist_progress`` and
     ``waist_side`` (walking paper, eq. 23-24). These pass the inner key points: to rest there would put spikes
-    of decimetres into the ZMP. Sides are told towards the foot that supports; ``sway`` multiplies them.
+    of decimetres into the ZMP. Sides count towards the foot that supports; ``sway`` multiplies them.
+
+    Args:
+        gait: with a free path, or channels of the waist.
+        steps: number of steps.
     """
     if gait.waist:
         progress, towards = free_path(gait.waist, steps)

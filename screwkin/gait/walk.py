@@ -9,12 +9,15 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, pose_from_array, unstack
 from screwkin.errors import expect
 from screwkin.gait.balance import ground_margin, ground_reaction, soles_on_floor
+from screwkin.gait.driven import driven
 from screwkin.gait.plan import Plan, plan
 from screwkin.gait.preview_plan import preview_plan
-from screwkin.gait.realise import differentiate, positions, stance_of
+from screwkin.gait.realise import differentiate, positions
 from screwkin.gait.record import Gait
+from screwkin.gait.stance import stance_of
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.mechanism.choice import closed_mechanism
+from screwkin.mechanism.rates import block_names
 from screwkin.model.robot import Robot, robot_text
 from screwkin.trajectory import Trajectory
 
@@ -25,13 +28,14 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
     """The whole-body trajectory of a gait.
 
     Args:
-        robot: with two legs, soles and a ``home`` posture; arms swing if it has them.
+        robot: with two legs, soles and a ``home`` posture; arms of three joints and more swing. Joints that
+            move no limb, or more than one, rest at home.
         gait: from ``load_gait``.
         steps: number of steps, at least 1; default: the gait's own, 8 unless its file says otherwise.
         command: the command line to record in the file.
 
     Returns:
-        Trajectory; ``meta["sigma"]`` tells the least singular value of every limb, ``meta["closure"]`` the
+        Trajectory; ``meta["sigma"]`` holds the least singular value of every limb, ``meta["closure"]`` the
         largest closure error.
 
     Raises:
@@ -42,33 +46,36 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
     expect(gait, Gait, "gait", 'load_gait("NAME")')
     table = robot_text(robot)
     steps = gait.steps if steps is None else steps
-    mechanism = closed_mechanism(robot)
+    whole = stance_of(robot)
+    drive = driven(robot)
+    mechanism, stance = closed_mechanism(drive.moving), drive.stance(whole)
     if gait.kind == "preview":
-        made = preview_plan(robot, mechanism, gait, steps)
+        planned = preview_plan(mechanism, gait, stance, steps)
     else:
-        made = plan(gait, stance_of(robot), steps)
-    solution = positions(robot, mechanism, made)
-    motion = differentiate(mechanism, made, solution.state)
-    tip_poses = _tip_poses(robot, made, motion.q)
+        planned = plan(gait, stance, steps)
+    solution = positions(mechanism, planned)
+    motion = differentiate(mechanism, planned, solution.state)
+    q, qd, qdd = drive.positions(solution.state.q), drive.rates(motion.qd), drive.rates(motion.qdd)
+    tip_poses = _tip_poses(robot, planned, q)
     zmp, com, wrench, _ = ground_reaction(
-        robot, made.T_world_base, motion.q, motion.qd, motion.qdd, made.base_twist, made.base_acceleration
+        robot, planned.T_world_base, q, qd, qdd, planned.base_twist, planned.base_acceleration
     )
-    soles = soles_on_floor(robot, made.feet, tip_poses)
+    soles = soles_on_floor(robot, planned.feet, tip_poses)
     return Trajectory(
-        time=made.time,
+        time=planned.time,
         joint_names=robot.joint_names,
-        q=motion.q,
-        qd=motion.qd,
-        qdd=motion.qdd,
-        T_world_base=made.T_world_base,
-        base_twist=made.base_twist,
-        base_acceleration=made.base_acceleration,
+        q=q,
+        qd=qd,
+        qdd=qdd,
+        T_world_base=planned.T_world_base,
+        base_twist=planned.base_twist,
+        base_acceleration=planned.base_acceleration,
         T_world_tip=tip_poses,
-        contact=made.contact,
-        feet=made.feet,
+        contact=planned.contact,
+        feet=planned.feet,
         com=com,
         zmp=zmp,
-        margin=ground_margin(zmp, com, wrench, soles, made.contact),
+        margin=ground_margin(zmp, com, wrench, soles, planned.contact),
         meta={
             "robot": {
                 "name": robot.name,
@@ -77,23 +84,23 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
             },
             "gait": gait.to_dict(),
             "steps": steps,
-            "boundaries": made.boundaries.tolist(),
+            "boundaries": planned.boundaries.tolist(),
             "closure": float(solution.residual.max()),
-            "sigma": dict(zip(motion.limbs, motion.sigma.min(axis=0).tolist(), strict=True)),
-            "notes": list(made.notes),
+            "sigma": dict(zip(block_names(mechanism), motion.sigma.min(axis=0).tolist(), strict=True)),
+            "notes": [*planned.notes, *drive.notes],
             "versions": {name: _version(name) for name in TRACED},
             "command": command,
         },
     )
 
 
-def _tip_poses(robot: Robot, made: Plan, q: Array) -> dict[str, Array]:
+def _tip_poses(robot: Robot, planned: Plan, q: Array) -> dict[str, Array]:
     """Pose of every tip: feet as planned, others where the joints carry them."""
     D = link_displacements(robot, unstack(q))
-    T = pose_from_array(made.T_world_base)
+    T = pose_from_array(planned.T_world_base)
     return {
-        tip: made.T_world_tip[tip]
-        if tip in made.T_world_tip
+        tip: planned.T_world_tip[tip]
+        if tip in planned.T_world_tip
         else as_array(T @ frame_pose(robot, D, tip), (len(q),))
         for tip in robot.tip_names
     }

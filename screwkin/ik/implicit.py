@@ -7,7 +7,6 @@ derivative needs neither: joints follow a moving target by the (pseudo)inverse o
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
 from typing import Any
 
 import jax
@@ -16,6 +15,7 @@ import numpy as np
 from jax import Array
 
 from screwkin.algebra.pattern import components
+from screwkin.algebra.pytrees import register_with_jax
 from screwkin.algebra.screws import at
 from screwkin.algebra.se3 import as_array, unstack
 from screwkin.ik import limb as limbs
@@ -43,7 +43,7 @@ def limb_in_jax(
     least_squares: bool,
 ) -> LimbSolutions:
     """As ``limb_ik``, for JAX arrays, perhaps traced, that broadcast to a batch."""
-    _register()
+    register_with_jax()
     inner = (poses.axes_of(target), 1)
     shapes = (target.shape[target.ndim - inner[0] :], guess.shape[-1:])
 
@@ -77,7 +77,7 @@ def pose_in_jax(
     settings: IkSettings,
 ) -> PoseSolution:
     """As ``solve_pose``, for JAX arrays, perhaps traced, that broadcast to a batch."""
-    _register()
+    register_with_jax()
     names = list(targets)
     inner = (*(poses.axes_of(targets[name]) for name in names), 1)
     given = (*targets.values(), guess)
@@ -202,20 +202,3 @@ def _in_base(T: Any, target: Any) -> Any:
         return (back @ (target - T[..., :3, 3])[..., None])[..., 0]
     turned, p = back @ target[..., :3, :3], back @ (target[..., :3, 3] - T[..., :3, 3])[..., None]
     return jnp.concatenate([jnp.concatenate([turned, p], axis=-1), target[..., 3:, :]], axis=-2)
-
-
-@cache
-def _register() -> None:
-    """Solutions go in and out of transformed functions: their arrays are leaves."""
-    about = ["limb", "joint_names", "method", "chain"]
-    jax.tree_util.register_dataclass(LimbSolutions, data_fields=list(LIMB), meta_fields=about)
-
-    def flatten(solution: PoseSolution) -> tuple[Values, tuple[str, ...]]:
-        state = solution.state
-        counts = (getattr(solution, name) for name in poses.COUNTED)
-        return (state.T_world_base, state.q, *counts), solution.limbs
-
-    def unflatten(names: tuple[str, ...], leaves: Values) -> PoseSolution:
-        return PoseSolution(State(*leaves[:2]), names, *leaves[2:])
-
-    jax.tree_util.register_pytree_node(PoseSolution, flatten, unflatten)

@@ -18,7 +18,7 @@ from screwkin.ik.system import System
 from screwkin.kinematics.arrays import checked, one_batch
 from screwkin.kinematics.rigid import nearest_poses
 from screwkin.kinematics.serial_chain import SerialChain
-from screwkin.model.robot import Robot
+from screwkin.model.robot import Robot, refuse_closures
 from screwkin.model.state import RIGID
 
 Method = Literal["auto", "closed", "hybrid", "newton", "lm", "dls", "pinv"]
@@ -65,7 +65,7 @@ def limb_ik(
     """
     if method not in get_args(Method):
         raise InputError(f"method is {method!r}; valid: {', '.join(get_args(Method))}")
-    refuse_closures(robot)
+    refuse_closures(robot, "limb_ik", "use close_loops")
     chain = SerialChain.of(robot, limb)
     poses = np.shape(T_base_tip)[-2:] == (4, 4)
     settings = settings or IkSettings()
@@ -140,19 +140,6 @@ def solve_limb(
     one = (slice(None), None)
     error, valid = np.linalg.norm(lack, axis=1), arrived(system, lack, settings)
     return ordered(chain, method, q[one], valid[one], error[one], iterations[one], guess, batch)
-
-
-def refuse_closures(robot: Robot) -> None:
-    """Refuse a robot whose loops limbs alone do not keep closed.
-
-    Raises:
-        InputError: it has closures.
-    """
-    if robot.closures:
-        names = ", ".join(closure.name for closure in robot.closures)
-        raise InputError(
-            f"{robot.name} has closures ({names}), which limbs alone do not keep; use close_loops"
-        )
 
 
 def rigid(T: Array) -> Array:

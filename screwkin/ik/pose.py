@@ -18,7 +18,6 @@ from screwkin.algebra.scalar import is_jax
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.ik.branches import certified_pose, closed_pose
 from screwkin.ik.closed import recognised
-from screwkin.ik.limb import refuse_closures
 from screwkin.ik.numeric import IkSettings, arrived, solve_system
 from screwkin.ik.pose_solution import PoseSolution
 from screwkin.ik.system import System
@@ -28,7 +27,7 @@ from screwkin.kinematics.arrays import rigid as refuse_foreign
 from screwkin.kinematics.rigid import nearest_poses
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.kinematics.status import CLOSED, SINGULAR, Status
-from screwkin.model.robot import Robot
+from screwkin.model.robot import Robot, refuse_closures
 from screwkin.model.state import RIGID, State, home
 
 Method = Literal["auto", "newton"]
@@ -75,7 +74,7 @@ def solve_pose(
     """
     if method not in get_args(Method):
         raise InputError(f"method is {method!r}; valid: {', '.join(get_args(Method))}")
-    refuse_closures(robot)
+    refuse_closures(robot, "solve_pose", "use close_loops")
     given, labels = dict(targets), {name: f"targets[{name!r}]" for name in targets}
     guess = home(robot) if guess is None else guess
     if "base" not in given:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Literal
 
-from screwkin.algebra.screws import at
+from screwkin.algebra.scalar import Scalar
+from screwkin.algebra.screws import Displacement, at
 from screwkin.algebra.se3 import NO_TWIST, ZERO, Pose, Twist, Vector, X, Y, Z
 from screwkin.errors import InputError
 from screwkin.kinematics import mass, positions
@@ -39,8 +41,8 @@ def link_poses(robot: Robot, T_world_base: Pose, q: Joints) -> list[Pose]:
 
     Source: paper A, eq. 2-3.
     """
-    D = positions.link_displacements(robot, q)
-    return [T_world_base @ (d @ link.frame) for d, link in zip(D, robot.links, strict=True)]
+    D = _turned(robot, T_world_base, q)
+    return [_world(T_world_base, d @ link.frame) for d, link in zip(D, robot.links, strict=True)]
 
 
 @formula
@@ -68,7 +70,7 @@ def frame_pose(robot: Robot, T_world_base: Pose, q: Joints, frame: str) -> Pose:
 
     Source: paper A, eq. 2-3.
     """
-    return T_world_base @ positions.frame_pose(robot, positions.link_displacements(robot, q), frame)
+    return _world(T_world_base, positions.frame_pose(robot, _turned(robot, T_world_base, q), frame))
 
 
 @formula
@@ -94,8 +96,8 @@ def tip_poses(robot: Robot, T_world_base: Pose, q: Joints) -> list[Pose]:
     """
     if not robot.limbs:
         raise InputError(f"{robot.name} has no limbs, so that it has no tips; write [[limb]] into its table")
-    D = positions.link_displacements(robot, q)
-    return [T_world_base @ positions.frame_pose(robot, D, limb.tip) for limb in robot.limbs]
+    D = _turned(robot, T_world_base, q)
+    return [_world(T_world_base, positions.frame_pose(robot, D, limb.tip)) for limb in robot.limbs]
 
 
 @formula
@@ -215,6 +217,16 @@ def com_jacobian(robot: Robot, T_world_base: Pose, q: Joints) -> Columns:
     D, twists = [turned @ d for d in local], positions.joint_twists(robot, local, turned)
     c = mass.center_of_mass(robot, D)
     return [*(at(c, twist).v for twist in BASIS), *mass.com_jacobian(robot, D, twists)]
+
+
+def _turned(robot: Robot, T: Pose, q: Sequence[Scalar]) -> list[Displacement]:
+    """Displacements of all links, world axes, from the base origin."""
+    return positions.link_displacements(robot, q, Displacement(T.R, ZERO, ZERO))
+
+
+def _world(T: Pose, pose: Pose) -> Pose:
+    """A pose in world axes from the base origin, from the world's origin."""
+    return Pose(pose.R, T.p + pose.p)
 
 
 def check_mass(robot: Robot) -> None:

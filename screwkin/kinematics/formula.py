@@ -24,7 +24,7 @@ from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.se3 import as_array, unstack
 from screwkin.compiler.program import Program, Recorder
 from screwkin.compiler.records import identifier
-from screwkin.errors import InputError
+from screwkin.errors import InputError, expect
 from screwkin.kinematics.arrays import Argument, checked_inputs
 from screwkin.kinematics.door import Door
 from screwkin.kinematics.kinds import KINDS, STATE, Kind, documented, flattened, kind_of
@@ -206,12 +206,11 @@ class Definition:
             InputError: no robot, or no State.
         """
         robot, state = robot_of(subject), values["state"]
-        if not isinstance(robot, Robot):
-            what = self.parameters[0]
-            wanted = "load_robot(...)" if what == "robot" else "closed_mechanism(robot)"
-            raise InputError(f"{self.name} takes a {what} from {wanted}, not {type(subject).__name__}")
-        if not isinstance(state, State):
-            raise InputError(f"{self.name} takes State(T_world_base, q), not {type(state).__name__}")
+        if type(robot) is not Robot or type(state) is not State:
+            first = self.parameters[0]
+            make = "load_robot(...)" if first == "robot" else "closed_mechanism(robot)"
+            expect(robot, Robot, first, make)
+            expect(state, State, "state", "State(T_world_base, q)")
         given: list[Given] = []
         arrays: list[Any] = []
         for name, kind in self.kinds.items():

@@ -6,6 +6,7 @@ Ranks are decided on columns whose velocities are divided by the robot's size, s
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -18,24 +19,13 @@ from screwkin.errors import InputError, SingularError, UnknownNameError, expect
 from screwkin.kinematics.positions import link_displacements
 from screwkin.mechanism.mechanism import Mechanism, coupling_graph, virtual_chains
 from screwkin.mechanism.network import coupling_twists, network_matrix
+from screwkin.mechanism.scaling import characteristic_length, referenced
 from screwkin.model.robot import Robot
 
 RANK_TOLERANCE = 1e-6
 """Smallest singular value, relative to the largest, of length-normalised screws still independent."""
 CLOSED = 1e-7
 """Largest gap of a closure, in sizes of the robot and in rad, at which ranks are decided."""
-
-
-def characteristic_length(robot: Robot) -> float:
-    """Size of the robot [m]: the largest distance of an axis point or tip from the base, at least 1 mm."""
-    points = [j.screw.s0 for j in robot.joints] + [limb.frame.p for limb in robot.limbs]
-    return max([1e-3, *(float(np.sqrt(sum(float(c) ** 2 for c in p))) for p in points)])
-
-
-def normalised(N: Array, length: float) -> Array:
-    """N with its velocity rows divided by a length: all entries of order one, without unit."""
-    scale = np.tile([1.0, 1.0, 1.0, 1.0 / length, 1.0 / length, 1.0 / length], N.shape[-2] // 6)
-    return N * scale.reshape(*(1 for _ in N.shape[:-2]), len(scale), 1)
 
 
 def rank(N: Array) -> int:
@@ -63,25 +53,29 @@ def independent(N: Array, order: Sequence[int]) -> list[int]:
 
 
 def network_at(mechanism: Mechanism, q: Sequence[float], R: Rotation = UNTURNED) -> Array:
-    """Length-normalised N at one posture."""
-    N = network_matrix(mechanism, coupling_twists(mechanism, R, list(q)))
-    return normalised(N, characteristic_length(mechanism.robot))
+    """Length-normalised N at one posture, every circuit at its reference point."""
+    return referenced(mechanism, network_matrix(mechanism, coupling_twists(mechanism, R, list(q))))
 
 
 def preference(mechanism: Mechanism) -> list[int]:
     """Columns in the order in which they would rather be secondary.
 
-    With virtual chains: real joints, then the rotations, then the translations of tips, the waist last.
-    Without: the last joint of the table first, so that the first ones drive.
+    With virtual chains: joints of one limb, then the rotations of tips, then joints that limbs share, then
+    the translations of tips, the waist last; a joint that no circuit needs never follows. Without: the last
+    joint of the table first, so that the first ones drive.
     """
     real = [mechanism.position[name] for name in mechanism.robot.joint_names]
     if not mechanism.chains:
         return real[::-1]
+    users = Counter(i for limb in mechanism.robot.limbs for i in mechanism.robot.path_to(limb.link))
+    shared = [column for i, column in enumerate(real) if users[i] > 1]
+    own = [column for column in real if column not in shared]
     tips = [chain for chain in mechanism.chains if chain.limb]
     waist = [name for chain in mechanism.chains if not chain.limb for name in chain.names]
     turning = [n for chain in tips for n in chain.names if n.split(".")[1][0] == "r"]
     moving = [n for chain in tips for n in chain.names if n.split(".")[1][0] == "p"]
-    return real + [mechanism.position[name] for name in (*turning, *moving, *waist)]
+    rotations, others = ([mechanism.position[n] for n in names] for names in (turning, (*moving, *waist)))
+    return own + rotations + shared + others
 
 
 def reference_posture(robot: Robot) -> tuple[float, ...]:
@@ -155,7 +149,8 @@ def _check_closed(robot: Robot, q: Sequence[float]) -> None:
             raise InputError(
                 f"{robot.name}: closure {closure.name} is open by {1e3 * gap:.3g} mm and "
                 f"{np.degrees(turn):.3g} deg at the posture where the mechanism is examined; give a posture "
-                f"home that closes it, by formulas or to nine digits (solve.closure.nearest_closed finds one)"
+                "home that closes it, by formulas or to nine digits (mechanism.closure.nearest_closed finds "
+                "one)"
             )
 
 
@@ -191,6 +186,6 @@ def _check(mechanism: Mechanism, N: Array) -> None:
 
 def mobility_at(mechanism: Mechanism, N: Array) -> Any:
     """Mobility (...,) at given states: couplings less the rank of N (..., 6 circuits, couplings)."""
-    values = np.linalg.svd(normalised(N, characteristic_length(mechanism.robot)), compute_uv=False)
+    values = np.linalg.svd(referenced(mechanism, N), compute_uv=False)
     ranks = (values > RANK_TOLERANCE * np.maximum(values[..., :1], 1.0)).sum(axis=-1)
     return len(mechanism.couplings) - ranks

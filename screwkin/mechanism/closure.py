@@ -30,9 +30,9 @@ from screwkin.errors import InputError, NoSolutionError, UnknownNameError
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.kinematics.status import CLOSED, SINGULAR, Status
 from screwkin.mechanism.chains import chain_coordinates, chain_pose
-from screwkin.mechanism.choice import characteristic_length
 from screwkin.mechanism.mechanism import Mechanism, coupling_graph, virtual_chains
 from screwkin.mechanism.network import coupling_twists, network_matrix
+from screwkin.mechanism.scaling import characteristic_length
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 

@@ -1,91 +1,138 @@
-"""Kernel of how regular a mechanism is: the least singular value of every block of secondary couplings."""
+"""How regular a mechanism is: the least singular value of every block of secondary couplings."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.algebra.scalar import Scalar, where
-from screwkin.algebra.se3 import UNTURNED, Twist, pose_from_array, unstack
+from screwkin.algebra.scalar import Scalar
+from screwkin.algebra.screws import Displacement, Screw, at, carry
+from screwkin.algebra.se3 import ZERO, Pose, Rotation, Twist, Vector
 from screwkin.algebra.singular_values import TRUSTED, least_singular_value
 from screwkin.compiler.program import Program, Recorder, kept
 from screwkin.compiler.records import identifier, pose_input
-from screwkin.compiler.run import run
-from screwkin.mechanism.choice import characteristic_length
-from screwkin.mechanism.davies import mechanism_of
-from screwkin.mechanism.mechanism import Mechanism
-from screwkin.mechanism.network import coupling_twists, network_matrix
-from screwkin.mechanism.rates import singular_values
+from screwkin.compiler.run import common_batch, run
+from screwkin.kinematics.positions import frame_pose, joint_screws, link_displacements
+from screwkin.mechanism.chains import chain_twists
+from screwkin.mechanism.limb_motion import seen_from
+from screwkin.mechanism.mechanism import Mechanism, mechanism_of
+from screwkin.mechanism.network import coupling_twists
+from screwkin.mechanism.rates import block_rows, network_of
+from screwkin.mechanism.scaling import (
+    centre,
+    characteristic_length,
+    reference_couplings,
+    referenced,
+    weighed,
+)
+from screwkin.mechanism.secondary import formula_blocks, tip_of
 from screwkin.model.robot import Robot
-
-LARGEST = 6
-"""Side of the largest block that a program takes on: longer formulas leave more in doubt."""
 
 
 def least_values(mechanism: Mechanism, T_world_base: Array, q: Array) -> Array:
-    """As ``mechanism.rates.singular_values`` of the network matrix, by a program where blocks are small.
+    """Least singular value of every block of secondary couplings, certified.
 
     Args:
         mechanism: the closed mechanism.
-        T_world_base: (B, 4, 4).
-        q: (B, n) [rad or m].
+        T_world_base: (..., 4, 4).
+        q: (..., n) [rad or m].
 
     Returns:
-        (B, blocks), velocities divided by ``characteristic_length``.
+        (..., blocks), screws at the circuits' reference points, velocities divided by
+        ``characteristic_length``: a number without unit.
     """
-    if not small(mechanism):
-        return _by_lapack(mechanism, T_world_base, q)
-    program = block_values(mechanism.robot, mechanism.primary, mechanism.secondary)
-    found = run(program, {"T_world_base": T_world_base, "q": q})
-    least, again = found["least"], np.flatnonzero((found["sure"] <= 0).any(axis=1))
-    if len(again):
-        T = np.broadcast_to(T_world_base, (len(q), 4, 4))[again]
-        least[again] = _by_lapack(mechanism, T, q[again])
+    batch = common_batch((T_world_base, q), (2, 1))
+    T = np.broadcast_to(T_world_base, (*batch, 4, 4)).reshape(-1, 4, 4)
+    q = np.broadcast_to(q, (*batch, q.shape[-1])).reshape(-1, q.shape[-1])
+    least = np.empty((len(q), len(mechanism.blocks)))
+    by_formula = formula_blocks(mechanism)
+    doubtful = np.arange(len(q))
+    if by_formula:
+        program = block_values(mechanism.robot, mechanism.primary, mechanism.secondary)
+        found = run(program, {"T_world_base": T, "q": q})
+        least[:, by_formula] = found["least"]
+        if len(by_formula) == len(mechanism.blocks):
+            doubtful = np.flatnonzero(~(found["error"] <= TRUSTED).all(axis=1))
+    if len(doubtful):
+        least[doubtful] = network_values(mechanism, network_of(mechanism, T[doubtful], q[doubtful]))
+    return least.reshape(*batch, least.shape[-1])
+
+
+def network_values(mechanism: Mechanism, N: Array) -> Array:
+    """The same (..., blocks) of network matrices (..., 6 circuits, couplings) formed at the base origin."""
+    least, columns = np.empty((*N.shape[:-2], len(mechanism.blocks))), mechanism.secondary_columns
+    scaled = referenced(mechanism, N)
+    for k, (circuits, own) in enumerate(mechanism.blocks):
+        A = scaled[..., block_rows(circuits), :][..., [columns[i] for i in own]]
+        least[..., k] = np.linalg.svd(A, compute_uv=False)[..., -1]
     return least
-
-
-def _by_lapack(mechanism: Mechanism, T_world_base: Array, q: Array) -> Array:
-    twists = coupling_twists(mechanism, pose_from_array(T_world_base).R, unstack(q))
-    return singular_values(mechanism, network_matrix(mechanism, twists, (len(q),)))
 
 
 @kept
 def block_values(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, ...]) -> Program:
-    """Least singular value of every block of a mechanism, and whether it is sure.
+    """Least singular value of each of ``formula_blocks`` and its error, a program of ``T_world_base q``.
 
     Args:
         robot: the robot.
-        primary: names of the imposed couplings, as in ``Mechanism.primary``.
-        secondary: names of those that follow.
+        primary: names of the primary couplings, as in ``Mechanism.primary``.
+        secondary: names of the secondary couplings.
     """
     mechanism = mechanism_of(robot, primary, secondary)
     recorder = Recorder(
         identifier(robot.name, "regular"),
-        f"Least singular value of the screws of every block of {robot.name} that follows, velocities over"
-        " the robot's size; sure: 1 if the formula is exact there.",
+        f"Least singular value of the secondary screws of every block of {robot.name}, velocities over the"
+        " robot's size; error: bound of its relative error, the value is certified where it is small.",
     )
     R, q = pose_input(recorder, "T_world_base").R, recorder.input("q", len(robot.joints))
-    # A common rotation of a block changes nothing. Virtual couplings are not turned by the base.
-    level, turned = (coupling_twists(mechanism, axes, q) for axes in (UNTURNED, R))
-    real, length = set(robot.joint_names), characteristic_length(robot)
-    found = []
-    for circuits, own in mechanism.blocks:
+    values: list[tuple[Scalar, Scalar]] = []
+    for k in formula_blocks(mechanism):
+        (circuit,), own = mechanism.blocks[k]
         columns = [mechanism.secondary_columns[i] for i in own]
-        twists = level if {mechanism.couplings[c] for c in columns} <= real else turned
-        signs = mechanism.circuit_matrix[circuits]
-        block = [
-            [int(sign) * x for sign in signs[:, c] for x in _weighed(twists[c], length)] for c in columns
-        ]
-        found.append(least_singular_value(block))
-    recorder.output("least", [value for value, _ in found])
-    recorder.output("sure", [where(error <= TRUSTED, 1.0, 0.0) for _, error in found])
+        signs = dict(zip(mechanism.couplings, mechanism.circuit_matrix[circuit].tolist(), strict=True))
+        names = [mechanism.couplings[c] for c in columns]
+        twists = _at_reference(mechanism, circuit, names, R, q)
+        length = characteristic_length(robot)
+        values.append(least_singular_value([weighed(twists[name] * signs[name], length) for name in names]))
+    recorder.output("least", [value for value, _ in values])
+    recorder.output("error", [error for _, error in values])
     return recorder.program()
 
 
-def small(mechanism: Mechanism) -> bool:
-    """True if all blocks are square and small: programs take them on."""
-    return all(6 * len(circuits) == len(own) <= LARGEST for circuits, own in mechanism.blocks)
+def _at_reference(
+    mechanism: Mechanism, circuit: int, names: Sequence[str], R: Rotation, q: Sequence[Scalar]
+) -> dict[str, Twist]:
+    """Screws of some couplings of a circuit at its reference point, in whatever axes they are simplest."""
+    chosen = reference_couplings(mechanism, mechanism.circuit_matrix[circuit].tolist())
+    tip = tip_of(mechanism, [mechanism.couplings[c] for c in chosen])
+    if tip is not None and tip.limb is not None:
+        path = mechanism.robot.path_to(tip.limb.link)
+        if [mechanism.robot.joint_names[i] for i in path] == list(names):
+            screws = [mechanism.robot.joints[i].screw for i in path]
+            return dict(zip(names, _limb_at_tip(screws, [q[i] for i in path], tip.limb.frame.p), strict=True))
+    twists = dict(zip(mechanism.couplings, coupling_twists(mechanism, R, q), strict=True))
+    if tip is None:
+        point = centre([twists[mechanism.couplings[c]] for c in chosen])
+        return {name: at(point, twist) for name, twist in twists.items()}
+    D = link_displacements(mechanism.robot, q, Displacement(R, ZERO, ZERO))
+    body, held = frame_pose(mechanism.robot, D, tip.name), mechanism.held(tip, Pose(R, ZERO))
+    here = {name: at(body.p, twist) for name, twist in twists.items()}
+    joints = zip(mechanism.robot.joint_names, joint_screws(mechanism.robot, D), strict=True)
+    here |= {name: _twist(screw, body.p) for name, screw in joints}
+    return here | dict(zip(tip.names, chain_twists(tip.couplings, body.R @ held.R.T, ZERO), strict=True))
 
 
-def _weighed(twist: Twist, length: float) -> list[Scalar]:
-    return [*twist.omega, *(x / length for x in twist.v)]
+def _limb_at_tip(screws: Sequence[Screw], q: Sequence[Scalar], tip: Vector) -> list[Twist]:
+    """Screws of a limb at its tip, in the axes of the link before the last joint.
+
+    A common rotation changes no singular value, and there most components are 0.
+    """
+    seen = seen_from(screws, q, len(screws) - 1)
+    here = seen[-1] @ tip
+    return [_twist(carry(D, screw), here) for D, screw in zip(seen[:-1], screws, strict=True)]
+
+
+def _twist(screw: Screw, point: Vector) -> Twist:
+    """The screw at a point: so expressed, what passes through the point has no velocity."""
+    return Screw(screw.s, screw.s0 - point, screw.pitch).twist

@@ -1,4 +1,4 @@
-"""Rates and accelerations of a limb's joints from the motions of base and tip, told where they are simplest.
+"""Rates and accelerations of a limb's joints from the motions of base and tip, in the axes that suit best.
 
 Screws are constant on their own links, so in the axes of a link amid the limb most of their components are 0:
 only the wanted motion is turned there. Formulas over records, any scalar.
@@ -20,15 +20,15 @@ from screwkin.model.robot import Limb, Robot
 
 @dataclass(frozen=True)
 class LimbMotion:
-    """A limb of six joints, whose tip follows a twist, or of three, whose tip follows a velocity.
+    """A limb of six joints, whose tip has a given twist, or of three, whose tip has a given velocity.
 
     Attributes:
         path: indices of its joints in q.
         split: see ``limb_rates``; None for three joints.
         length: of the limb [m].
         tip: pose of the tip; world axes, from the base origin.
-        point: where screws are told: the split's point, or the tip of three joints; world axes, likewise.
-        axes: from the axes of the link in which screws are told to world axes.
+        point: where screws are expressed, see ``point_of``; world axes, likewise.
+        axes: from the axes of the link in which screws are expressed to world axes.
         twists: the screws, in the link's axes at the point.
     """
 
@@ -51,17 +51,17 @@ class LimbMotion:
             limb: one of its limbs.
             D: displacements of all links.
             q: joint positions.
-            joints: number of the limb's joints before the link in whose axes screws are told.
+            joints: number of the limb's joints before the link in whose axes screws are expressed.
         """
         chain = SerialChain.of(robot, limb.name)
         split, path = split_of(chain), chain.joints
         carried = dict(zip(robot.link_names, D, strict=True))
         links = [robot.joints[path[0]].parent, *(robot.joints[i].child for i in path)]
-        link, fixed = told_at(chain, split)
+        link, fixed = point_of(chain, split)
         point = carried[links[link]] @ fixed
-        told = seen_screws(chain, split, [q[i] for i in path], joints)
+        twists = seen_screws(chain, split, [q[i] for i in path], joints)
         tip = frame_pose(robot, D, limb.tip)
-        return cls(path, split, chain.length, tip, point, carried[links[joints]].R, told)
+        return cls(path, split, chain.length, tip, point, carried[links[joints]].R, twists)
 
     def _turned(self, omega: Vector, v: Vector) -> Twist:
         back = self.axes.T
@@ -80,8 +80,8 @@ class LimbMotion:
         """Joint rates, and the limb's determinant.
 
         Args:
-            base: its twist, told at the base origin, world axes.
-            tip: twist told at the tip's origin; of three joints only its velocity matters.
+            base: its twist at the base origin, world axes.
+            tip: twist at the tip's origin; of three joints only its velocity matters.
         """
         v = self._here(tip) - (base.v + cross(base.omega, self.point))
         return self._solved(self._turned(tip.omega - base.omega, v))
@@ -108,22 +108,21 @@ class LimbMotion:
         return self._solved(wanted - known)[0]
 
 
-def told_at(chain: SerialChain, split: Split | None) -> tuple[int, Vector]:
-    """Where a limb's screws are told: after how many joints the link that bears the point, and the point.
+def point_of(chain: SerialChain, split: Split | None) -> tuple[int, Vector]:
+    """Where a limb's screws are expressed: the split's point, else the tip.
 
-    The split's point, else the first axis of six joints, and the tip of three; zero pose.
+    Returns:
+        Number of joints before the link to which the point belongs, and the point in the zero pose.
     """
-    if len(chain.screws) == 3:
-        return 3, chain.tip.p
-    return (split.first, split.point) if split else (0, chain.screws[0].s0)
+    return (split.first, split.point) if split else (len(chain.screws), chain.tip.p)
 
 
 def seen_screws(
     chain: SerialChain, split: Split | None, q: Sequence[Scalar], joints: int
 ) -> tuple[Twist, ...]:
-    """A limb's screws at ``told_at``, in the axes of the link after that many joints."""
+    """A limb's screws at ``point_of``, axes of the link after that many joints."""
     seen = seen_from(chain.screws, q, joints)
-    link, fixed = told_at(chain, split)
+    link, fixed = point_of(chain, split)
     here = seen[link] @ fixed
     screws = [carry(d, screw) for d, screw in zip(seen, chain.screws, strict=False)]
     return tuple(Screw(s.s, s.s0 - here, s.pitch).twist for s in screws)

@@ -12,16 +12,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Literal
-
-import numpy as np
 
 from screwkin.algebra.linear import cramer, orthogonal
 from screwkin.algebra.scalar import Scalar, minus, times
-from screwkin.algebra.se3 import Twist, Vector, dot, leaves
+from screwkin.algebra.se3 import Twist, Vector, dot
 from screwkin.kinematics.axis_geometry import meeting, parallel
 from screwkin.kinematics.serial_chain import SerialChain
+from screwkin.mechanism.scaling import levers, skeleton, weighed
 
 
 @dataclass(frozen=True)
@@ -48,7 +46,7 @@ def split_of(chain: SerialChain) -> Split | None:
             return Split("meeting", k, point)
     for k in range(4):
         if parallel(chain, k, k + 1) and parallel(chain, k + 1, k + 2):
-            return Split("parallel", k, chain.screws[k].s0)
+            return Split("parallel", k, skeleton(chain.screws, chain.tip.p)[k])
     return None
 
 
@@ -67,7 +65,7 @@ def pose_rates(
         The six rates, and the determinant of the screws with velocities divided by ``length``.
     """
     if split is None:
-        return orthogonal([_weighed(t, length) for t in twists], _weighed(wanted, length))
+        return orthogonal([weighed(t, length) for t in twists], weighed(wanted, length))
     three = list(split.three)
     others = [i for i in range(6) if i not in three]
     axis = twists[three[0]].omega
@@ -92,26 +90,17 @@ def pose_rates(
     return [found[i] for i in range(6)], times(first, second)
 
 
-def _weighed(twist: Twist, length: float) -> list[Scalar]:
-    return [*twist.omega, *(x / length for x in twist.v)]
-
-
 def point_rates(twists: Sequence[Twist], wanted: Vector, length: float) -> tuple[list[Scalar], Scalar]:
     """Rates of three joints, their screws told at a point, that move it as wanted; and their determinant."""
     return cramer([t.v / length for t in twists], wanted / length)
 
 
 def doubtful(chain: SerialChain, tolerance: float) -> float:
-    """Determinant below which a limb's least singular value may lie below the tolerance.
+    """Determinant below which a limb's least singular value at its tip may lie below the tolerance.
 
-    The product of the other five singular values is at most that of a matrix with its Frobenius norm shared
-    equally; the norm is bounded by how far from the base the limb reaches.
+    The product of the other singular values is at most that of a matrix with its Frobenius norm shared
+    equally; the norm is bounded by how far from the tip the axes can be.
     """
-    reach, norms = 0.0, []
-    points = [chain.screws[0].s0, *(screw.s0 for screw in chain.screws)]
-    start = float(np.linalg.norm(leaves(points[0])))
-    for a, b in pairwise(points):
-        reach += float(np.linalg.norm(leaves(b - a)))
-        norms.append(1 + ((start + reach) / chain.length) ** 2)
+    norms = [1 + (reach / chain.length) ** 2 for reach in levers(chain.screws, chain.tip.p)]
     n = len(norms)
     return float(tolerance * (sum(norms) / (n - 1)) ** ((n - 1) / 2))

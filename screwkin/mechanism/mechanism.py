@@ -210,3 +210,9 @@ def coupling_graph(robot: Robot, chains: tuple[VirtualChain, ...]) -> Graph:
     vertices |= dict.fromkeys(vertex for _, tail, head in edges for vertex in (tail, head))
     used = {vertex for _, tail, head in edges for vertex in (tail, head)}
     return Graph(tuple(v for v in vertices if v in used), tuple(edges))
+
+
+def mechanism_of(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, ...]) -> Mechanism:
+    """The mechanism of a robot with a choice that has been checked."""
+    chains = virtual_chains(robot)
+    return Mechanism(robot, chains, coupling_graph(robot, chains), primary, secondary, len(primary))

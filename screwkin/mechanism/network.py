@@ -14,6 +14,8 @@ import numpy as np
 from screwkin.algebra.scalar import Scalar, is_jax
 from screwkin.algebra.screws import at
 from screwkin.algebra.se3 import NO_TWIST, ZERO, Pose, Rotation, Twist, Vector, as_array, bracket
+from screwkin.kinematics.formula import formula
+from screwkin.kinematics.kinds import Columns, Joints
 from screwkin.kinematics.positions import frame_pose, joint_twists, link_displacements
 from screwkin.mechanism.chains import chain_twists
 from screwkin.mechanism.graph import Integers
@@ -41,6 +43,24 @@ def coupling_twists(
         R_chain = body.R @ mechanism.held(chain, turned).R.T
         twists |= zip(chain.names, chain_twists(chain.couplings, R_chain, body.p), strict=True)
     return [at(point, twists[name]) for name in mechanism.couplings]
+
+
+@formula
+def coupling_screws(
+    mechanism: Mechanism, T_world_base: Pose, q: Joints, point: Vector | None = None
+) -> Columns:
+    """Normalised screws of all couplings of the closed mechanism, world axes.
+
+    Args:
+        mechanism: from ``closed_mechanism``.
+        state:
+        point: world point [m] at which they are expressed; default: the base origin.
+
+    Returns:
+        S (..., 6, couplings), columns [omega; v at the point].
+    """
+    at_point = ZERO if point is None else point - T_world_base.p
+    return coupling_twists(mechanism, T_world_base.R, q, at_point)
 
 
 def network_blocks(mechanism: Mechanism, twists: Sequence[Twist]) -> list[list[Twist]]:

@@ -17,7 +17,6 @@ from screwkin.kinematics.status import Status
 from screwkin.mechanism import rates
 from screwkin.mechanism.mechanism import WAIST, Mechanism
 from screwkin.mechanism.network import coupling_twists, network_blocks
-from screwkin.mechanism.secondary import secondary_rates as kernel_rates
 from screwkin.mechanism.singularity import refuse_singular
 from screwkin.mechanism.virtual_motion import imposing_chains, primary_motion
 from screwkin.model.state import State
@@ -109,18 +108,30 @@ def virtual_motion(
 
 def secondary_rates(
     mechanism: Mechanism, state: State, primary_rates: Any, on_singular: Literal["raise", "status"] = "raise"
-) -> Any:
-    """Rates (..., secondary) of the computed couplings from those of the imposed ones, by Davies' method.
+) -> Array | tuple[Array, Array]:
+    """Rates of the secondary couplings from those of the primary ones, by Davies' method.
 
     Args:
         mechanism: from ``closed_mechanism``.
-        state: a closed state.
+        state: T_world_base (..., 4, 4) and q (..., n), closed.
         primary_rates: (..., primary), in ``mechanism.primary`` order [rad/s, m/s].
         on_singular: ``"raise"``, or ``"status"`` to get (rates, status (...,)) with ``Status.SINGULAR``
             marking samples solved by least squares. Traced JAX arrays cannot raise: use ``"status"`` there.
 
+    Returns:
+        (..., secondary), in ``mechanism.secondary`` order [rad/s, m/s].
+
     Raises:
         SingularError: a limb is singular; names limb, sample and cause.
+        ShapeError: a wrong shape, NaN or infinity, or a base pose that is not rigid.
+
+    Example:
+        >>> import numpy as np
+        >>> import screwkin as sk
+        >>> mechanism = sk.closed_mechanism(sk.load_robot(sk.robot_names()[0]))
+        >>> rates = sk.secondary_rates(mechanism, sk.home(mechanism.robot), np.zeros(24))
+        >>> rates.shape, float(abs(rates).max())
+        ((24,), 0.0)
 
     Source: paper A, eq. 10-11.
     """
@@ -131,34 +142,12 @@ def secondary_rates(
         Argument("q", "state.q", (len(mechanism.robot.joints),)),
         Argument("primary", "primary_rates", (len(mechanism.primary),)),
     ]
-    arrays, batch = checked_inputs(arguments, [state.T_world_base, state.q, primary_rates])
-    fast = None if any(map(is_jax, arrays)) else _by_program(mechanism, arrays, batch)
-    if fast is not None:
-        values, singular = fast
-        if on_singular == "status":
-            return values, _status(singular, values.shape[:-1])
-        if not singular.any():
-            return values
-    N = network_matrix(mechanism, state)
-    solution = rates.secondary_rates(mechanism, N, arrays[2])
+    (T, q, primary), _ = checked_inputs(arguments, [state.T_world_base, state.q, primary_rates])
+    solution = rates.secondary_rates(mechanism, T, q, primary)
     if on_singular == "status":
         return solution.values, _status(solution.singular.any(axis=-1), solution.values.shape[:-1])
-    refuse_singular(mechanism, N, solution)
+    refuse_singular(mechanism, T, q, solution.singular)
     return solution.values
-
-
-def _by_program(
-    mechanism: Mechanism, arrays: list[Array], batch: tuple[int, ...]
-) -> tuple[Array, Array] | None:
-    """Secondary rates by the program, and which samples are singular; None where blocks are too large."""
-    flat = [
-        np.broadcast_to(a, (*batch, *a.shape[a.ndim - inner :])).reshape(-1, *a.shape[a.ndim - inner :])
-        for a, inner in zip(arrays, (2, 1, 1), strict=True)
-    ]
-    found = kernel_rates(mechanism, *flat)
-    if found is None:
-        return None
-    return found[0].reshape(*batch, len(mechanism.secondary)), found[1].reshape(batch)
 
 
 def _status(singular: Any, batch: tuple[int, ...]) -> Array:

@@ -1,37 +1,43 @@
-"""Secondary rates and accelerations from the primary ones: Davies' method, batched.
+"""Secondary rates and accelerations from the primary ones, by Davies' method, certified.
 
-Source: paper A, eq. 10-11. The system falls apart into blocks of circuits that share secondary
-couplings (for a humanoid whose waist is imposed: one limb each), and each block is one small solve.
+The system falls apart into blocks of circuits that share secondary couplings (for a humanoid whose waist is
+imposed: one limb each). A program solves the blocks that have a formula; what it does not certify, and all
+other blocks, are solved by singular values.
+
+Source: paper A, eq. 10-11.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from screwkin.algebra.arrays import Array
+from screwkin.algebra.arrays import Array, numpy_of
 from screwkin.algebra.scalar import is_jax
-from screwkin.algebra.se3 import NO_TWIST, Twist, as_array
-from screwkin.mechanism.choice import RANK_TOLERANCE, characteristic_length, normalised
+from screwkin.algebra.se3 import as_array, twist_from_array, unstack
+from screwkin.compiler.run import common_batch, run
+from screwkin.mechanism.choice import RANK_TOLERANCE
 from screwkin.mechanism.mechanism import Mechanism
-from screwkin.mechanism.network import twist_rates
+from screwkin.mechanism.network import assembled, coupling_screws, twist_rates
+from screwkin.mechanism.scaling import reference_points, referenced
+from screwkin.mechanism.secondary import formula_blocks, secondary_program
+from screwkin.model.state import State
+
+CERTIFIED = 2 * RANK_TOLERANCE
+"""Lower bound of a block's least singular value above which its formula is certified.
+
+The margin to ``RANK_TOLERANCE`` exceeds rounding, so that the verdict on a sample is the same on every path.
+"""
 
 
 @dataclass(frozen=True)
 class SecondarySolution:
-    """Secondary magnitudes (..., secondary), and for every block its smallest normalised singular value."""
+    """Magnitudes of the secondary couplings (..., secondary), and which blocks are singular (..., blocks)."""
 
     values: Array
-    sigma: Array
-    blocks: tuple[str, ...]
-
-    @property
-    def singular(self) -> Array:
-        """(..., blocks) bool."""
-        return self.sigma < RANK_TOLERANCE
+    singular: Array
 
 
 def block_name(mechanism: Mechanism, circuits: Sequence[int]) -> str:
@@ -49,96 +55,140 @@ def block_rows(circuits: Sequence[int]) -> list[int]:
     return [6 * c + r for c in circuits for r in range(6)]
 
 
-def solve_secondary(mechanism: Mechanism, N: Array, right: Array) -> SecondarySolution:
-    """Secondary magnitudes x with N_s x = right, block by block.
+def secondary_rates(mechanism: Mechanism, T_world_base: Array, q: Array, primary: Array) -> SecondarySolution:
+    """Rates of the secondary couplings from those of the primary ones: eq. 11.
 
     Args:
-        mechanism: says which columns are secondary.
-        N: network matrix (..., 6 circuits, couplings).
-        right: (..., 6 circuits).
+        mechanism: the closed mechanism.
+        T_world_base: (..., 4, 4), NumPy or JAX.
+        q: (..., n) [rad or m].
+        primary: (..., primary), in ``mechanism.primary`` order [rad/s or m/s].
 
     Returns:
-        values (..., secondary); singular blocks are solved by least squares and flagged by ``sigma``.
-        Overconstrained loops (more equations than the rank) are solved by least squares too; their
-        equations agree at a closed position.
+        Singular blocks are solved by least squares, and marked.
     """
-    np_ = _numpy_of(N, right)
-    length = characteristic_length(mechanism.robot)
-    columns = mechanism.secondary_columns
-    scaled, wanted = normalised(N, length), normalised(right[..., None], length)
-    parts: list[tuple[int, Array]] = []
-    sigmas = []
-    for circuits, inside in mechanism.blocks:
-        rows = block_rows(circuits)
-        A = scaled[..., rows, :][..., [columns[i] for i in inside]]
-        b = wanted[..., rows, :]
-        sigma = np_.linalg.svd(A, compute_uv=False)[..., -1]
-        if A.shape[-1] == A.shape[-2]:
-            healthy = (sigma >= RANK_TOLERANCE)[..., None, None]
-            eye = np_.broadcast_to(np_.eye(A.shape[-1]), A.shape)
-            x = np_.linalg.solve(np_.where(healthy, A, eye), b)[..., 0]
-            if not is_jax(A) and not healthy.all():
-                least = (np.linalg.pinv(A, rcond=RANK_TOLERANCE) @ b)[..., 0]
-                x = np.where(healthy[..., 0], x, least)
-        else:
-            x = (np_.linalg.pinv(A, rcond=RANK_TOLERANCE) @ b)[..., 0]
-        parts += [(i, x[..., k]) for k, i in enumerate(inside)]
-        sigmas.append(sigma)
-    names = block_names(mechanism)
-    if not parts:  # nothing follows: a tree without tips
-        nothing = np_.zeros((*right.shape[:-1], 0))
-        return SecondarySolution(nothing, nothing, names)
-    values = np_.stack([x for _, x in sorted(parts, key=lambda part: part[0])], axis=-1)
-    return SecondarySolution(values, np_.stack(sigmas, axis=-1), names)
+    batch = common_batch((T_world_base, q, primary), (2, 1, 1))
+    if any(map(is_jax, (T_world_base, q, primary))):
+        xp = numpy_of(T_world_base, q, primary)
+        N = network_of(mechanism, T_world_base, q)
+        N = xp.broadcast_to(N, (*batch, *N.shape[-2:]))
+        return _by_singular_values(mechanism, N, xp.broadcast_to(primary, (*batch, primary.shape[-1])))
+    T, q, primary = (
+        np.broadcast_to(a, (*batch, *a.shape[a.ndim - k :])).reshape(-1, *a.shape[a.ndim - k :])
+        for a, k in ((T_world_base, 2), (q, 1), (primary, 1))
+    )
+    values = np.zeros((len(q), len(mechanism.secondary)))
+    singular = np.zeros((len(q), len(mechanism.blocks)), dtype=bool)
 
+    def solve(samples: Array, blocks: Sequence[int]) -> None:
+        N = network_of(mechanism, T[samples], q[samples])
+        solution = _by_singular_values(mechanism, N, primary[samples], blocks)
+        for k in blocks:
+            own = mechanism.blocks[k][1]
+            values[samples[:, None], own] = solution.values[:, own]
+            singular[samples, k] = solution.singular[:, k]
 
-def secondary_rates(mechanism: Mechanism, N: Array, primary: Array) -> SecondarySolution:
-    """Rates of the secondary couplings from those of the primary ones (..., primary): eq. 11."""
-    Np = N[..., mechanism.primary_columns]
-    return solve_secondary(mechanism, N, -(Np @ primary[..., None])[..., 0])
+    by_formula = formula_blocks(mechanism)
+    others = [k for k in range(len(mechanism.blocks)) if k not in by_formula]
+    if by_formula:
+        program = secondary_program(mechanism.robot, mechanism.primary, mechanism.secondary)
+        found = run(program, {"T_world_base": T, "q": q, "primary": primary})
+        values[:, [i for k in by_formula for i in mechanism.blocks[k][1]]] = found["secondary"]
+        doubtful = np.flatnonzero(~(found["least"] > CERTIFIED).all(axis=-1))
+        if len(doubtful):
+            solve(doubtful, by_formula)
+    if others and len(q):
+        solve(np.arange(len(q)), others)
+    return SecondarySolution(
+        values.reshape(*batch, values.shape[-1]), singular.reshape(*batch, singular.shape[-1])
+    )
 
 
 def secondary_accelerations(
-    mechanism: Mechanism, twists: Sequence[Twist], N: Array, rates: Array, primary: Array
+    mechanism: Mechanism, T_world_base: Array, q: Array, rates: Array, primary: Array
 ) -> SecondarySolution:
     """Second derivatives of the secondary couplings: N q'' = -N' q', with N' from the brackets of the screws.
 
     Args:
         mechanism: the closed mechanism.
-        twists: the couplings' screws at the states (as for N).
-        N: network matrix (..., 6 circuits, couplings).
-        rates: rates of all couplings (..., couplings).
-        primary: second derivatives of the primary couplings (..., primary).
+        T_world_base: (..., 4, 4), NumPy or JAX.
+        q: (..., n) [rad or m].
+        rates: of all couplings (..., couplings), as ``blend`` puts them together [rad/s or m/s].
+        primary: second derivatives of the primary couplings (..., primary) [rad/s^2 or m/s^2].
+
+    Returns:
+        As ``secondary_rates``.
     """
-    scalars = [rates[..., i] for i in range(rates.shape[-1])]
-    moving = twist_rates(mechanism, twists, scalars)
-    bias = [dS * rate for dS, rate in zip(moving, scalars, strict=True)]
-    rows = []
-    for signs in mechanism.circuit_matrix:
-        total = NO_TWIST
-        for sign, term in zip(signs, bias, strict=True):
-            if sign:
-                total = total + term * int(sign)
-        rows.append(total)
-    coriolis = as_array(rows, rates.shape[:-1]).reshape(*rates.shape[:-1], -1)
-    Np = N[..., mechanism.primary_columns]
-    return solve_secondary(mechanism, N, -(Np @ primary[..., None])[..., 0] - coriolis)
+    batch = common_batch((T_world_base, q, rates, primary), (2, 1, 1, 1))
+    xp = numpy_of(T_world_base, q, rates, primary)
+    S = screws_of(mechanism, T_world_base, q)
+    S = xp.broadcast_to(S, (*batch, *S.shape[-2:]))
+    rates = xp.broadcast_to(rates, (*batch, rates.shape[-1]))
+    scalars = unstack(rates)
+    moving = twist_rates(mechanism, [twist_from_array(S[..., c]) for c in range(S.shape[-1])], scalars)
+    bias = as_array([dS * rate for dS, rate in zip(moving, scalars, strict=True)], batch)
+    coriolis = xp.matmul(mechanism.circuit_matrix.astype(float), bias).reshape(
+        *batch, 6 * len(mechanism.circuits)
+    )
+    return _by_singular_values(mechanism, assembled(mechanism, S), primary, known=coriolis)
 
 
-def _numpy_of(*arrays: Array) -> Any:
-    if any(is_jax(a) for a in arrays):
-        import jax.numpy as jnp
-
-        return jnp
-    return np
+def screws_of(mechanism: Mechanism, T_world_base: Array, q: Array) -> Array:
+    """Screws of all couplings (..., 6, couplings), at the base origin, world axes."""
+    return coupling_screws(mechanism, State(T_world_base, q))
 
 
-def singular_values(mechanism: Mechanism, N: Array) -> Array:
-    """Smallest singular value (..., blocks) of every limb's or loop's secondary block, length-normalised."""
-    scaled = normalised(N, characteristic_length(mechanism.robot))
-    columns = mechanism.secondary_columns
-    sigma = np.empty((*N.shape[:-2], len(mechanism.blocks)))
-    for k, (circuits, inside) in enumerate(mechanism.blocks):
-        A = scaled[..., block_rows(circuits), :][..., [columns[i] for i in inside]]
-        sigma[..., k] = np.linalg.svd(A, compute_uv=False)[..., -1]
-    return sigma
+def network_of(mechanism: Mechanism, T_world_base: Array, q: Array) -> Array:
+    """Network matrix (..., 6 circuits, couplings) of checked arrays, formed at the base origin."""
+    N: Array = assembled(mechanism, screws_of(mechanism, T_world_base, q))
+    return N
+
+
+def _by_singular_values(
+    mechanism: Mechanism,
+    N: Array,
+    primary: Array,
+    blocks: Sequence[int] | None = None,
+    known: Array | None = None,
+) -> SecondarySolution:
+    """Secondary magnitudes x with N_s x = -N_p primary - known, for some blocks (default: all), else zero.
+
+    Overconstrained loops (more equations than the rank) are solved by least squares too; their equations
+    agree at a closed position.
+    """
+    xp, points = numpy_of(N, primary), reference_points(mechanism, N)
+    scaled = referenced(mechanism, N, points)
+    right = -(scaled[..., mechanism.primary_columns] @ primary[..., None])
+    if known is not None:
+        right = right - referenced(mechanism, known[..., None], points)
+    batch, columns = right.shape[:-2], mechanism.secondary_columns
+    values: list[Array] = [xp.zeros(batch)] * len(columns)
+    singular: list[Array] = [xp.zeros(batch, dtype=bool)] * len(mechanism.blocks)
+    for k in range(len(mechanism.blocks)) if blocks is None else blocks:
+        circuits, inside = mechanism.blocks[k]
+        rows = block_rows(circuits)
+        x, singular[k] = _solve(scaled[..., rows, :][..., [columns[i] for i in inside]], right[..., rows, :])
+        for j, i in enumerate(inside):
+            values[i] = x[..., j]
+    return SecondarySolution(
+        xp.stack(values, axis=-1) if values else xp.zeros((*batch, 0)),
+        xp.stack(singular, axis=-1) if singular else xp.zeros((*batch, 0), dtype=bool),
+    )
+
+
+def _solve(A: Array, b: Array) -> tuple[Array, Array]:
+    """x (..., n) with A x = b, by least squares where A is singular or not square; where it is singular."""
+    xp = numpy_of(A, b)
+    singular = xp.linalg.svd(A, compute_uv=False)[..., -1] < RANK_TOLERANCE
+    if A.shape[-1] != A.shape[-2]:
+        return (xp.linalg.pinv(A, rcond=RANK_TOLERANCE) @ b)[..., 0], singular
+    here, eye = singular[..., None, None], xp.broadcast_to(xp.eye(A.shape[-1]), A.shape)
+    x = xp.linalg.solve(xp.where(here, eye, A), b)
+    if is_jax(A):
+        from jax.lax import stop_gradient
+
+        least = xp.linalg.pinv(stop_gradient(xp.where(here, A, eye)), rcond=RANK_TOLERANCE) @ b
+        x = xp.where(here, least, x)
+    elif singular.any():
+        x[singular] = np.linalg.pinv(A[singular], rcond=RANK_TOLERANCE) @ b[singular]
+    return x[..., 0], singular

@@ -1,114 +1,79 @@
-"""Kernel of Davies' method: secondary rates from primary ones, block by block, by reciprocal screws.
+"""Davies' method as a program: secondary rates from primary ones, block by block, by reciprocal screws.
 
-Each block of N that joins one circuit is six equations. Where three of its screws meet in a point (a hip, an
-ankle, the virtual rotations of a hand) or are parallel, they fall apart into two systems of three.
+A block that joins one circuit by six couplings is six equations. Where three of its screws meet in a point (a
+hip, an ankle, the virtual rotations of a hand) or are parallel, they fall apart into two systems of three.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-import numpy as np
-
-from screwkin.algebra import scalar
-from screwkin.algebra.arrays import Array
-from screwkin.algebra.scalar import Scalar
+from screwkin.algebra.scalar import Scalar, abs_, sqrt
 from screwkin.algebra.screws import Displacement, at
-from screwkin.algebra.se3 import (
-    NO_TWIST,
-    UNTURNED,
-    ZERO,
-    Rotation,
-    Twist,
-    Vector,
-    dot,
-    pose_from_array,
-    unstack,
-)
+from screwkin.algebra.se3 import NO_TWIST, UNTURNED, ZERO, Rotation, Twist, Vector, dot
 from screwkin.compiler.program import Program, Recorder, kept
 from screwkin.compiler.records import identifier, pose_input
-from screwkin.compiler.run import run
-from screwkin.kinematics.positions import link_displacements
+from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.kinematics.serial_chain import SerialChain
-from screwkin.mechanism import rates
-from screwkin.mechanism.choice import RANK_TOLERANCE, characteristic_length
-from screwkin.mechanism.davies import mechanism_of
-from screwkin.mechanism.least_values import small
 from screwkin.mechanism.limb_rates import Split, pose_rates, split_of
-from screwkin.mechanism.mechanism import Mechanism
-from screwkin.mechanism.network import coupling_twists, network_matrix
+from screwkin.mechanism.mechanism import Mechanism, VirtualChain, mechanism_of
+from screwkin.mechanism.network import coupling_twists
+from screwkin.mechanism.scaling import centre, characteristic_length, levers, reference_couplings
 from screwkin.model.robot import Robot
 
 
-def secondary_rates(
-    mechanism: Mechanism, T_world_base: Array, q: Array, primary: Array
-) -> tuple[Array, Array] | None:
-    """As ``mechanism.rates.secondary_rates``, by a program; None if blocks are too large for one.
-
-    Args:
-        mechanism: the closed mechanism.
-        T_world_base: (B, 4, 4).
-        q: (B, n) [rad or m].
-        primary: (B, primary) [rad/s or m/s].
-
-    Returns:
-        (B, secondary), samples in doubt by the network matrix; and which samples (B,) are singular.
-    """
-    if not small(mechanism):
-        return None
-    program = followers(mechanism.robot, mechanism.primary, mechanism.secondary)
-    found = run(program, {"T_world_base": T_world_base, "q": q, "primary": primary})
-    values, again = found["secondary"], np.flatnonzero(~(found["least"] > RANK_TOLERANCE).all(axis=-1))
-    singular = np.zeros(len(values), dtype=bool)
-    if len(again):
-        twists = coupling_twists(mechanism, pose_from_array(T_world_base[again]).R, unstack(q[again]))
-        N = network_matrix(mechanism, twists, (len(again),))
-        solution = rates.secondary_rates(mechanism, N, primary[again])
-        values[again], singular[again] = solution.values, solution.singular.any(axis=-1)
-    return np.asarray(values), singular
+def formula_blocks(mechanism: Mechanism) -> list[int]:
+    """Indices of the blocks that have a formula: one circuit, six secondary couplings."""
+    return [k for k, (circuits, own) in enumerate(mechanism.blocks) if len(circuits) == 1 and len(own) == 6]
 
 
 @kept
-def followers(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, ...]) -> Program:
-    """Rates of the secondary couplings, and a lower bound of every block's least singular value.
+def secondary_program(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, ...]) -> Program:
+    """Rates of the secondary couplings of all ``formula_blocks``, and a bound of their singular values.
 
     Args:
         robot: the robot.
-        primary: names of the imposed couplings, as in ``Mechanism.primary``.
-        secondary: names of those that follow.
+        primary: names of the primary couplings, as in ``Mechanism.primary``.
+        secondary: names of the secondary couplings.
+
+    Returns:
+        Program of ``T_world_base q primary``; ``secondary``: block by block; ``least``: no singular value of
+        a block at its reference point, normalised, is smaller.
 
     Source: paper A, eq. 10-11.
     """
     mechanism = mechanism_of(robot, primary, secondary)
     recorder = Recorder(
         identifier(robot.name, "secondary"),
-        f"Rates of the couplings of {robot.name} that follow, from those that are imposed; least: below it no"
-        " singular value of a block's screws lies, velocities over the robot's size.",
+        f"Rates of the secondary couplings of {robot.name} from those of the primary ones; least: a lower"
+        " bound of the singular values of each block's screws, velocities over the robot's size.",
     )
     R, q = pose_input(recorder, "T_world_base").R, recorder.input("q", len(robot.joints))
     imposed = dict(zip(primary, recorder.input("primary", len(primary)), strict=True))
     twists = _in_base_axes(mechanism, R, q)
     D = link_displacements(robot, q)
-    found: dict[int, Scalar] = {}
+    rates: list[Scalar] = []
     least = []
-    for circuits, own in mechanism.blocks:
-        signs = dict(zip(mechanism.couplings, mechanism.circuit_matrix[circuits[0]].tolist(), strict=True))
+    for k in formula_blocks(mechanism):
+        (circuit,), own = mechanism.blocks[k]
+        signs = dict(zip(mechanism.couplings, mechanism.circuit_matrix[circuit].tolist(), strict=True))
         wanted = NO_TWIST
         for name, rate in imposed.items():
             if signs[name]:
                 wanted = wanted - twists[name] * rate * signs[name]
         names = [secondary[i] for i in own]
-        columns = [twists[name] * signs[name] for name in names]
-        values, bound = _solved(mechanism, D, names, columns, wanted)
-        found.update(zip(own, values, strict=True))
-        least.append(bound)
-    recorder.output("secondary", [found[i] for i in range(len(secondary))])
+        split, point = _split(mechanism, D, names)
+        columns = [at(point, twists[name] * signs[name]) for name in names]
+        values, determinant = pose_rates(columns, split, at(point, wanted), characteristic_length(robot))
+        rates += values
+        least.append(_bound(mechanism, circuit, names, twists, D, determinant))
+    recorder.output("secondary", rates)
     recorder.output("least", least)
     return recorder.program()
 
 
 def _in_base_axes(mechanism: Mechanism, R: Rotation, q: Sequence[Scalar]) -> dict[str, Twist]:
-    """Every coupling's screw, told at the base origin in the base's axes, where joints have most zeros."""
+    """Every coupling's screw at the base origin, base axes, where joints have most zeros."""
     real, back = set(mechanism.robot.joint_names), R.T
     level, turned = (coupling_twists(mechanism, axes, q) for axes in (UNTURNED, R))
     return {
@@ -117,24 +82,52 @@ def _in_base_axes(mechanism: Mechanism, R: Rotation, q: Sequence[Scalar]) -> dic
     }
 
 
-def _solved(
+def _bound(
     mechanism: Mechanism,
-    D: Sequence[Displacement],
+    circuit: int,
     names: Sequence[str],
-    columns: Sequence[Twist],
-    wanted: Twist,
-) -> tuple[list[Scalar], Scalar]:
-    """Rates of one block, and a lower bound of its least singular value.
+    twists: Mapping[str, Twist],
+    D: Sequence[Displacement],
+    determinant: Scalar,
+) -> Scalar:
+    """Lower bound of a block's least singular value, from its determinant, which no reference point changes.
 
     The determinant is the product of the singular values; all but the least have a product of at most that
     of a matrix whose Frobenius norm they share equally.
     """
-    split, point = _split(mechanism, D, names)
-    length = characteristic_length(mechanism.robot)
-    there = [at(point, column) for column in columns]
-    values, determinant = pose_rates(there, split, at(point, wanted), length)
-    square = sum(dot(c.omega, c.omega) + dot(c.v, c.v) / length**2 for c in columns) / 5.0
-    return values, scalar.sqrt(determinant * determinant / (square * square * square * square * square))
+    length, row = characteristic_length(mechanism.robot), mechanism.circuit_matrix[circuit].tolist()
+    reference = [mechanism.couplings[c] for c in reference_couplings(mechanism, row)]
+    tip = tip_of(mechanism, reference)
+    sizes = {} if tip is None else _sizes(mechanism.robot, tip, length)
+    if all(name in sizes for name in names):
+        return abs_(determinant) / (sum(sizes[name] for name in names) / 5) ** 2.5
+    point = centre([twists[x] for x in reference]) if tip is None else _tip(mechanism, D, tip)
+    there = [at(point, twists[name]) for name in names]
+    mean = sum(dot(t.omega, t.omega) + dot(t.v, t.v) / length**2 for t in there) / 5
+    return abs_(determinant) / (mean * mean * sqrt(mean))
+
+
+def tip_of(mechanism: Mechanism, reference: Sequence[str]) -> VirtualChain | None:
+    """The virtual chain of a tip whose rotations, two at least, are these couplings."""
+    for chain in mechanism.chains:
+        if chain.limb is not None and len(reference) > 1 and set(reference) <= set(chain.names):
+            return chain
+    return None
+
+
+def _sizes(robot: Robot, tip: VirtualChain, length: float) -> dict[str, float]:
+    """Bounds of the squared norms of screws at a limb's tip: revolute joints, and the tip's own chain."""
+    assert tip.limb is not None
+    joints = [robot.joints[i] for i in robot.path_to(tip.limb.link)]
+    own = {name: 1.0 if name.split(".")[1][0] == "r" else 1 / length**2 for name in tip.names}
+    if any(joint.type != "revolute" or joint.screw.is_translation for joint in joints):
+        return own
+    reach = levers([joint.screw for joint in joints], tip.limb.frame.p)
+    return own | {j.name: 1 + (r / length) ** 2 for j, r in zip(joints, reach, strict=True)}
+
+
+def _tip(mechanism: Mechanism, D: Sequence[Displacement], tip: VirtualChain) -> Vector:
+    return frame_pose(mechanism.robot, D, tip.name).p
 
 
 def _split(
@@ -145,12 +138,13 @@ def _split(
     carried = dict(zip(robot.link_names, D, strict=True))
     for limb in robot.limbs:
         path = robot.path_to(limb.link)
+        tip = carried[limb.link] @ limb.frame.p
         if [robot.joint_names[i] for i in path] == list(names):
             split = split_of(SerialChain.of(robot, limb.name))
             if split is not None:
                 return split, carried[robot.joints[path[split.first]].parent] @ split.point
+            return None, tip
         turning = {f"{limb.tip}.{axis}" for axis in ("rx", "ry", "rz")}
         if turning == set(names[-3:]):
-            tip = carried[limb.link] @ limb.frame.p
             return Split("meeting", len(names) - 3, tip), tip
     return None, ZERO

@@ -13,11 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from screwkin.algebra.arrays import Array
+from screwkin.compiler.run import common_batch
 from screwkin.errors import SingularError
 from screwkin.kinematics.status import Status
-from screwkin.mechanism.choice import characteristic_length, normalised
+from screwkin.mechanism.least_values import least_values, network_values
 from screwkin.mechanism.mechanism import Mechanism
-from screwkin.mechanism.rates import SecondarySolution, block_name, block_rows
+from screwkin.mechanism.rates import block_name, block_rows, network_of
+from screwkin.mechanism.scaling import referenced
+from screwkin.model.state import State
 
 NEAR = 0.02
 """Smallest normalised singular value below which a limb is reported as near a singularity."""
@@ -38,50 +41,76 @@ class LimbSingularity:
     cause: str
 
 
-def singularity_report(mechanism: Mechanism, N: Array) -> tuple[LimbSingularity, ...]:
+def singularity_report(mechanism: Mechanism, at: State | Array) -> tuple[LimbSingularity, ...]:
     """For every limb or loop its least regular sample.
 
     Args:
         mechanism: the closed mechanism.
-        N: network matrix (..., 6 circuits, couplings), formed at the waist origin.
+        at: a state, batched or not; or its network matrices (..., 6 circuits, couplings), formed at the base
+            origin as ``network_matrix`` does by default.
+
+    Returns:
+        One entry for every block of secondary couplings. Singular values have no unit: screws are taken at
+        the tip (of a loop: at the point nearest to its axes), velocities over ``characteristic_length``.
     """
-    scaled = normalised(N, characteristic_length(mechanism.robot)).reshape(-1, *N.shape[-2:])
-    columns = mechanism.secondary_columns
-    report = []
-    for circuits, inside in mechanism.blocks:
-        chosen = [columns[i] for i in inside]
-        A = scaled[:, block_rows(circuits)][:, :, chosen]
-        sigma = np.linalg.svd(A, compute_uv=False)[:, -1]
-        worst = int(sigma.argmin())
-        null = np.linalg.svd(A[worst])[2][-1]
-        taking = [k for k in range(len(chosen)) if abs(null[k]) > 0.05 * np.abs(null).max()]
-        names = [mechanism.couplings[c] for c in chosen]
-        near = bool(sigma[worst] < NEAR)
-        cause = _cause(names, _screws(scaled[worst], mechanism, chosen), taking) if near else ""
-        taken = tuple(names[k] for k in taking)
-        report.append(
-            LimbSingularity(block_name(mechanism, circuits), worst, float(sigma[worst]), near, taken, cause)
-        )
-    return tuple(report)
+    if isinstance(at, State):
+        T, q = np.asarray(at.T_world_base, dtype=float), np.asarray(at.q, dtype=float)
+        batch = common_batch((T, q), (2, 1))
+        T = np.broadcast_to(T, (*batch, 4, 4)).reshape(-1, 4, 4)
+        q = np.broadcast_to(q, (*batch, q.shape[-1])).reshape(-1, q.shape[-1])
+        sigma = least_values(mechanism, T, q)
+        worst = sigma.argmin(axis=0)
+        N = network_of(mechanism, T[worst], q[worst])
+    else:
+        every = np.reshape(at, (-1, *np.shape(at)[-2:]))
+        sigma = network_values(mechanism, every)
+        worst = sigma.argmin(axis=0)
+        N = every[worst]
+    scaled = referenced(mechanism, N)
+    return tuple(
+        _entry(mechanism, k, int(sample), float(sigma[sample, k]), scaled[k])
+        for k, sample in enumerate(worst)
+    )
+
+
+def _entry(mechanism: Mechanism, block: int, sample: int, sigma: float, scaled: Array) -> LimbSingularity:
+    """The entry of one block, from its referenced network matrix at its worst sample."""
+    circuits, inside = mechanism.blocks[block]
+    chosen = [mechanism.secondary_columns[i] for i in inside]
+    null = np.linalg.svd(scaled[block_rows(circuits)][:, chosen])[2][-1]
+    dependent = [k for k in range(len(chosen)) if abs(null[k]) > 0.05 * np.abs(null).max()]
+    names = [mechanism.couplings[c] for c in chosen]
+    near = sigma < NEAR
+    cause = _cause(names, _screws(scaled, mechanism, chosen), dependent) if near else ""
+    joints = tuple(names[k] for k in dependent)
+    return LimbSingularity(block_name(mechanism, circuits), sample, sigma, near, joints, cause)
 
 
 def refuse_singular(
-    mechanism: Mechanism, N: Array, solution: SecondarySolution, time: Array | None = None
+    mechanism: Mechanism, T_world_base: Array, q: Array, singular: Array, time: Array | None = None
 ) -> None:
-    """Raise for the first singular sample of a solution with the network matrix N (..., rows, couplings).
+    """Raise for the first singular sample of a batch.
+
+    Args:
+        mechanism: the closed mechanism.
+        T_world_base: (..., 4, 4).
+        q: (..., n) [rad or m].
+        singular: (..., blocks) bool, from ``secondary_rates`` or ``least_values``.
+        time: of the samples (T,) [s], for the message.
 
     Raises:
-        SingularError: names limb, sample, its time [s] where times (T,) are given, and the cause.
+        SingularError: names limb, sample, its time where times are given, and the cause.
     """
-    if not solution.singular.any():
+    if not singular.any():
         return
-    flat = np.reshape(solution.singular, (-1, solution.singular.shape[-1]))
-    sample, block = (int(i) for i in np.argwhere(flat)[0])
-    here = np.reshape(np.asarray(N), (-1, *N.shape[-2:]))[sample]
-    limb, cause = solution.blocks[block], singularity_report(mechanism, here)[block].cause
+    batch, blocks = singular.shape[:-1], singular.shape[-1]
+    sample, block = (int(i) for i in np.argwhere(np.reshape(singular, (-1, blocks)))[0])
+    T = np.broadcast_to(T_world_base, (*batch, 4, 4)).reshape(-1, 4, 4)[sample]
+    here = State(T, np.broadcast_to(q, (*batch, q.shape[-1])).reshape(-1, q.shape[-1])[sample])
+    entry = singularity_report(mechanism, here)[block]
     when = "" if time is None else f" (t = {time[sample]:.3f} s)"
-    message = f"{limb}, sample {sample}{when}: singular; {cause}; {Status.SINGULAR.help}"
-    raise SingularError(message, limb, sample)
+    message = f"{entry.limb}, sample {sample}{when}: singular; {entry.cause}; {Status.SINGULAR.help}"
+    raise SingularError(message, entry.limb, sample)
 
 
 def _screws(N: Array, mechanism: Mechanism, columns: Sequence[int]) -> Array:
@@ -92,27 +121,27 @@ def _screws(N: Array, mechanism: Mechanism, columns: Sequence[int]) -> Array:
 
 def _cause(names: Sequence[str], screws: Array, taking: Sequence[int]) -> str:
     """What is special about the dependent screws of a block, in words; ``taking`` are the dependent ones."""
-    dependent, told = screws[list(taking)], [names[k] for k in taking]
-    listed = ", ".join(told)
-    if len(told) == 1:
+    dependent, chosen = screws[list(taking)], [names[k] for k in taking]
+    listed = ", ".join(chosen)
+    if len(chosen) == 1:
         return f"{listed} cannot move its body in a direction that the loop allows"
     if (np.linalg.norm(dependent[:, :3], axis=1) > 1e-9).all():
-        if len(told) == 2 and _parallel(dependent[:, :3]):
+        if len(chosen) == 2 and _parallel(dependent[:, :3]):
             inside = ", ".join(names[taking[0] + 1 : taking[1]])
             turned = f": {inside} between them is near +-90 deg" if inside else ""
             return f"the axes of {listed} fall together{turned}"
         for k in taking[1:-1]:
             if _stretched(screws, taking, k):
-                before, after = told[: told.index(names[k])], told[told.index(names[k]) + 1 :]
+                before, after = chosen[: chosen.index(names[k])], chosen[chosen.index(names[k]) + 1 :]
                 return (
                     f"{names[k]} is near straight or fully folded: its axis lies in one plane with "
                     f"{', '.join(before)} before it and {', '.join(after)} behind it"
                 )
         if _meeting_point(dependent) is not None:
             return _concurrent(names, taking)
-        for split in range(2, len(told) - 1):
+        for split in range(2, len(chosen) - 1):
             if all(_meeting_point(part) is not None for part in (dependent[:split], dependent[split:])):
-                here, there = ", ".join(told[:split]), ", ".join(told[split:])
+                here, there = ", ".join(chosen[:split]), ", ".join(chosen[split:])
                 return (
                     f"{here} and {there} can both turn about the line through the two points where they meet"
                 )
@@ -121,14 +150,14 @@ def _cause(names: Sequence[str], screws: Array, taking: Sequence[int]) -> str:
 
 def _concurrent(names: Sequence[str], taking: Sequence[int]) -> str:
     """Dependent axes through one point: a ball at its limit, or a far axis that passes through the ball."""
-    told = [names[k] for k in taking]
-    ends = {told[0]: taking[1] - taking[0], told[-1]: taking[-1] - taking[-2]}
+    chosen = [names[k] for k in taking]
+    ends = {chosen[0]: taking[1] - taking[0], chosen[-1]: taking[-1] - taking[-2]}
     far, gap = max(ends.items(), key=lambda end: end[1])
-    if gap > 1 and len(told) > 2:
-        others = ", ".join(name for name in told if name != far)
+    if gap > 1 and len(chosen) > 2:
+        others = ", ".join(name for name in chosen if name != far)
         return f"the axis of {far} passes through the point where those of {others} meet"
-    middle = told[len(told) // 2]
-    return f"the axes of {', '.join(told)} meet in a point and lie in one plane: {middle} is near +-90 deg"
+    middle = chosen[len(chosen) // 2]
+    return f"the axes of {', '.join(chosen)} meet in a point and lie in one plane: {middle} is near +-90 deg"
 
 
 def _parallel(axes: Array) -> bool:

@@ -60,7 +60,8 @@ class Robot(RobotRecord):
     """
 
     def __post_init__(self) -> None:
-        check_records(self)
+        if check_records(self):
+            self.__dict__["is_symbolic"] = False
 
     @classmethod
     def from_text(cls, text: str, path: str = "<text>", symbolic: bool = False) -> Self:
@@ -287,7 +288,7 @@ def refuse_closures(robot: Robot, what: str, instead: str) -> None:
     Args:
         robot: any robot.
         what: the function that sees the open tree only, such as ``"mass_matrix"``.
-        instead: what honours the closures, such as ``"secondary_rates of closed_mechanism(robot)"``.
+        instead: what to do instead, such as ``"use close_loops"``.
 
     Raises:
         InputError: the robot has closures.
@@ -295,5 +296,5 @@ def refuse_closures(robot: Robot, what: str, instead: str) -> None:
     if robot.closures:
         names = ", ".join(closure.name for closure in robot.closures)
         raise InputError(
-            f"{robot.name} has closures ({names}), and {what} sees the open tree only; use {instead}"
+            f"{robot.name} has closures ({names}), and {what} sees the open tree only; {instead}"
         )

@@ -1,4 +1,4 @@
-"""The bench on which a paper's measures are taken: every robot, walk and study is made once."""
+"""The bench on which a paper's measures are taken: every robot, walk and study is computed once."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 from screwkin.analysis.account import Account, account_of
 from screwkin.analysis.compare import Comparison, compare_models
-from screwkin.analysis.engines import Yielding
+from screwkin.analysis.engines import SimulatedCompliance
 from screwkin.analysis.facts import Facts, facts_of
 from screwkin.analysis.validate import Validation, validate
 from screwkin.gait.files import load_gait
@@ -16,8 +16,7 @@ from screwkin.gait.walk import walk
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
 
-Made = TypeVar("Made")
-
+T = TypeVar("T")
 
 Changes = Mapping[str, str | float]
 
@@ -25,20 +24,20 @@ Changes = Mapping[str, str | float]
 class Bench:
     """What measures share.
 
-    ``robot`` is the paper's, meant wherever a measure names none; ``changes`` are made to every gait first.
+    ``robot`` is the paper's, the default of every measure; ``changes`` apply to every gait.
     """
 
     def __init__(self, robot: str, changes: Changes | None = None) -> None:
         self._default = robot
         self._changes = dict(changes or {})
-        self._made: dict[tuple[object, ...], Any] = {}
+        self._results: dict[tuple[object, ...], Any] = {}
 
-    def once(self, key: tuple[object, ...], make: Callable[[], Made]) -> Made:
-        """What ``make`` gives, made at the first call for a key."""
-        if key not in self._made:
-            self._made[key] = make()
-        found: Made = self._made[key]
-        return found
+    def once(self, key: tuple[object, ...], compute: Callable[[], T]) -> T:
+        """The result of ``compute``, called once for every key."""
+        if key not in self._results:
+            self._results[key] = compute()
+        result: T = self._results[key]
+        return result
 
     def robot(self, name: str = "") -> Robot:
         """A robot; the paper's if no name is given."""
@@ -69,9 +68,9 @@ class Bench:
 
     def validation(self, account: Account, sole_stiffness: float | None = None) -> Validation:
         """The verdict of the simulator on a walk, with rigid soles or elastic ones [N/m]."""
-        trajectory, gives = account.trajectory, Yielding(sole_stiffness=sole_stiffness)
+        trajectory, compliance = account.trajectory, SimulatedCompliance(sole_stiffness=sole_stiffness)
         key = ("validation", trajectory.sha256, sole_stiffness)
-        return self.once(key, lambda: validate(account.robot, trajectory, gives=gives))
+        return self.once(key, lambda: validate(account.robot, trajectory, compliance=compliance))
 
     def comparison(self, robot: str = "") -> Comparison:
         """Screws against DH tables."""

@@ -1,4 +1,4 @@
-"""What a paper tells, as data: tables and figures, its numbers, and the measures that answer them.
+"""What a paper says, as data: tables and figures, its numbers, and the measures that answer them.
 
 A file in ``papers/`` holds ``[paper]`` (name, title, source, robot, and ``changes`` to its gaits, if any) and
 ``[[section]]`` (place, title, text) with rows and pictures. A row has ``item``, ``measure``, and as far as
@@ -35,8 +35,8 @@ UNITS: Mapping[str, float] = {
 
 
 @dataclass(frozen=True)
-class Row:
-    """One line: what the paper tells, and the measure that gives our value."""
+class Claim:
+    """One line: what the paper prints, and the measure that returns our value."""
 
     item: str
     measure: str
@@ -64,7 +64,7 @@ class Section:
     place: str
     title: str
     text: str = ""
-    rows: tuple[Row, ...] = ()
+    rows: tuple[Claim, ...] = ()
     pictures: tuple[Picture, ...] = ()
 
 
@@ -107,60 +107,60 @@ def parse_paper(text: str, path: str = "<text>") -> Paper:
     if not isinstance(head.get("changes", {}), dict):
         faults.append(Fault("[paper]", "changes", "no table", "Write { parameter = value } of the gaits"))
     sections = []
-    for number, told in enumerate(_tables(data, "section", faults), 1):
+    for number, table in enumerate(_tables(data, "section", faults), 1):
         where = f"section {number}"
-        made = _checked(Section, told, where, faults, ("rows", "pictures"), ("row", "picture"))
+        values = _checked(Section, table, where, faults, ("rows", "pictures"), ("row", "picture"))
         rows = [
-            _row(row, f"{where}, row {k}", faults) for k, row in enumerate(_tables(told, "row", faults), 1)
+            _row(row, f"{where}, row {k}", faults) for k, row in enumerate(_tables(table, "row", faults), 1)
         ]
         drawn = [
             _checked(Picture, picture, f"{where}, picture {k}", faults)
-            for k, picture in enumerate(_tables(told, "picture", faults), 1)
+            for k, picture in enumerate(_tables(table, "picture", faults), 1)
         ]
         if not faults:
             pictures = tuple(Picture(**picture) for picture in drawn)
-            sections.append(Section(**made, rows=tuple(Row(**row) for row in rows), pictures=pictures))
+            sections.append(Section(**values, rows=tuple(Claim(**row) for row in rows), pictures=pictures))
     faults += [Fault("", key, "unknown key", "Remove it") for key in data if key not in ("paper", "section")]
     if faults:
         raise FileFaults(path, faults)
     return Paper(**head, sections=tuple(sections))
 
 
-def _row(told: Any, where: str, faults: list[Fault]) -> dict[str, Any]:
-    made = _checked(Row, told, where, faults)
-    unit = made.get("unit", "")
+def _row(table: Any, where: str, faults: list[Fault]) -> dict[str, Any]:
+    values = _checked(Claim, table, where, faults)
+    unit = values.get("unit", "")
     if unit and unit not in UNITS:
         faults.append(Fault(where, "unit", f"unknown unit {unit!r}", f"Write one of {', '.join(UNITS)}"))
-    return made
+    return values
 
 
 def _tables(data: Any, key: str, faults: list[Fault]) -> list[Any]:
-    found = data.get(key, []) if isinstance(data, dict) else []
-    if not isinstance(found, list):
+    tables = data.get(key, []) if isinstance(data, dict) else []
+    if not isinstance(tables, list):
         faults.append(Fault("", key, "no list of tables", f"Write [[{key}]]"))
         return []
-    return found
+    return tables
 
 
 def _checked(
     kind: type,
-    told: Any,
+    table: Any,
     where: str,
     faults: list[Fault],
-    made: Sequence[str] = (),
+    nested: Sequence[str] = (),
     besides: Sequence[str] = (),
 ) -> dict[str, Any]:
     """The keys of a table as arguments of a record; missing and unknown ones become faults."""
-    if not isinstance(told, dict):
+    if not isinstance(table, dict):
         faults.append(Fault(where, "", "no table", "Write its keys"))
         return {}
-    known = {f.name.rstrip("_"): f for f in fields(kind) if f.name not in made}
+    known = {f.name.rstrip("_"): f for f in fields(kind) if f.name not in nested}
     values = {}
-    for key, value in told.items():
+    for key, value in table.items():
         if key in known:
             values[known[key].name] = value
         elif key not in besides:
             faults.append(Fault(where, key, "unknown key", f"Valid: {', '.join([*known, *besides])}"))
     needed = [name for name, f in known.items() if f.default is f.default_factory]
-    faults += [Fault(where, name, "missing", "Give it") for name in needed if name not in told]
+    faults += [Fault(where, name, "missing", "Give it") for name in needed if name not in table]
     return values

@@ -1,4 +1,4 @@
-"""Figures of papers drawn again, by name: each takes the bench and named arguments, and gives a figure."""
+"""Figures of papers drawn again, by name: each takes the bench and named arguments, and returns a figure."""
 
 from __future__ import annotations
 
@@ -34,58 +34,23 @@ from screwkin.sim.measure import ZmpRecord
 Drawing = Callable[..., Figure]
 
 
-def feet_along_x(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
-    """Feet against time along x."""
-    return motion.feet_along_x(bench.account(gait, steps, robot))
+def _of_walk(draw: Callable[..., Figure | None], **options: object) -> Drawing:
+    """A report's picture of a walk's account as a drawing of a paper."""
 
+    def drawing(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
+        figure = draw(bench.account(gait, steps, robot), **options)
+        if figure is None:
+            raise InputError(f"{bench.robot(robot).name} has no legs, so there are no joint angles to draw")
+        return figure
 
-def feet_along_z(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
-    """Height of the feet against time."""
-    return motion.feet_along_z(bench.account(gait, steps, robot))
-
-
-def waist_along_x(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
-    """Waist against time along x."""
-    return motion.waist_along_x(bench.account(gait, steps, robot))
-
-
-def waist_along_y(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
-    """Waist and feet against time along y."""
-    return motion.waist_along_y(bench.account(gait, steps, robot))
-
-
-def joint_angles(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
-    """Joint angles of the legs."""
-    figure = motion.joint_angles(bench.account(gait, steps, robot))
-    if figure is None:
-        raise InputError(f"{bench.robot(robot).name} has no legs, so there are no joint angles to draw")
-    return figure
+    drawing.__doc__ = draw.__doc__
+    return drawing
 
 
 def walking(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
     """Frames of the simulated walk."""
     account = bench.account(gait, steps, robot)
     return frames.frames_of_run(account, bench.validation(account).run)
-
-
-def planned(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
-    """Frames of the planned walk, from the side."""
-    return frames.frames_drawn(bench.account(gait, steps, robot))
-
-
-def zmp_along_x(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
-    """GCoM and ZMP against time along x."""
-    return balance.zmp_against_gcom(bench.account(gait, steps, robot), 0)
-
-
-def zmp_along_y(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
-    """GCoM and ZMP against time along y."""
-    return balance.zmp_against_gcom(bench.account(gait, steps, robot), 1)
-
-
-def seen_from_above(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
-    """Soles, support polygons, GCoM and ZMP from above."""
-    return balance.seen_from_above(bench.account(gait, steps, robot))
 
 
 def reach_maps(
@@ -101,16 +66,16 @@ def deflection_maps(
     bench: Bench, limb: str, heights: Sequence[float], stiffness: float = 1.0, robot: str = ""
 ) -> Figure:
     """Length of the deflection at several heights."""
-    found = [sinking_of(bench, limb, height, stiffness, "linear", 0.005, robot) for height in heights]
-    return maps.deflection_overview(bench.robot(robot), found)
+    sunk = [sinking_of(bench, limb, height, stiffness, "linear", 0.005, robot) for height in heights]
+    return maps.deflection_overview(bench.robot(robot), sunk)
 
 
 def deflection_parts(
     bench: Bench, limb: str, height: float, stiffness: float = 1.0, robot: str = ""
 ) -> Figure:
     """Components of the deflection at a height."""
-    found = sinking_of(bench, limb, height, stiffness, "linear", 0.005, robot)
-    return maps.deflection_picture(bench.robot(robot), found)
+    sunk = sinking_of(bench, limb, height, stiffness, "linear", 0.005, robot)
+    return maps.deflection_picture(bench.robot(robot), sunk)
 
 
 def preview(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
@@ -132,7 +97,7 @@ def preview(bench: Bench, gait: str, steps: int | None = None, robot: str = "") 
 
 
 def compensated_joints(bench: Bench, gait: str, limb: str, stiffness: float, robot: str = "") -> Figure:
-    """Joint angles of a limb as intended, and what compensation adds to them."""
+    """Joint angles of a limb as planned, and what compensation adds to them."""
     account = bench.account(gait, None, robot)
     table, time = account.robot, account.trajectory.time
     change = np.degrees(compensated_of(bench, gait, stiffness, "swing", robot).q - account.trajectory.q)
@@ -151,15 +116,15 @@ def compensated_joints(bench: Bench, gait: str, limb: str, stiffness: float, rob
     return figure
 
 
-def foot_from_waist(bench: Bench, gait: str, limb: str, stiffness: float, robot: str = "") -> Figure:
-    """The foot seen from the waist along x, y and z, as intended and as compensation commands it."""
+def commanded_foot(bench: Bench, gait: str, limb: str, stiffness: float, robot: str = "") -> Figure:
+    """The foot seen from the waist along x, y and z, as planned and as compensation commands it."""
     account = bench.account(gait, None, robot)
-    intended, told = _seen_from_waist(bench, gait, limb, stiffness, robot)
+    planned, commanded = _seen_from_waist(bench, gait, limb, stiffness, robot)
     figure, axes = new_figure(6.0, 3, sharex=True)
     for k, one in enumerate(axes):
         shade_swings(one, account)
-        one.plot(account.trajectory.time, 1e3 * intended[:, k], color=PLAIN, label="intended")
-        one.plot(account.trajectory.time, 1e3 * told[:, k], "--", color=SIDES[0], label="commanded")
+        one.plot(account.trajectory.time, 1e3 * planned[:, k], color=PLAIN, label="intended")
+        one.plot(account.trajectory.time, 1e3 * commanded[:, k], "--", color=SIDES[0], label="commanded")
         one.set_ylabel(f"{'xyz'[k]} [mm]")
     time_axis(axes[-1], account)
     legend_above(figure, [axes[0]])
@@ -169,11 +134,11 @@ def foot_from_waist(bench: Bench, gait: str, limb: str, stiffness: float, robot:
 def compensated_foot(bench: Bench, gait: str, limb: str, stiffness: float, robot: str = "") -> Figure:
     """By how much compensation moves the commanded foot, seen from the waist."""
     account = bench.account(gait, None, robot)
-    intended, told = _seen_from_waist(bench, gait, limb, stiffness, robot)
+    planned, commanded = _seen_from_waist(bench, gait, limb, stiffness, robot)
     figure, axes = new_figure(3.0)
     shade_swings(axes, account)
     for k, colour in enumerate((SIDES[0], SIDES[1], PLAIN)):
-        moved = 1e3 * (told - intended)[:, k]
+        moved = 1e3 * (commanded - planned)[:, k]
         axes.plot(account.trajectory.time, moved, color=colour, label="xyz"[k], linestyle=LINES[k])
     axes.set_ylabel(f"{shown(account.robot.limb(limb).tip)} moved by [mm]")
     time_axis(axes, account)
@@ -182,15 +147,15 @@ def compensated_foot(bench: Bench, gait: str, limb: str, stiffness: float, robot
 
 
 def _seen_from_waist(bench: Bench, gait: str, limb: str, stiffness: float, robot: str) -> list[Array]:
-    """Places (T, 3) [m] of a limb's tip in the waist's frame, as intended and as commanded."""
+    """Places (T, 3) [m] of a limb's tip in the waist's frame, as planned and as commanded."""
     account = bench.account(gait, None, robot)
-    told = compensated_of(bench, gait, stiffness, "swing", robot).q
+    commanded = compensated_of(bench, gait, stiffness, "swing", robot).q
     tip = account.robot.limb(limb).tip
     return [
         as_array(frame_pose(account.robot, link_displacements(account.robot, unstack(q)), tip), (len(q),))[
             :, :3, 3
         ]
-        for q in (account.trajectory.q, told)
+        for q in (account.trajectory.q, commanded)
     ]
 
 
@@ -249,40 +214,39 @@ _TREATED = (
 def _run_of(bench: Bench, gait: str, treatment: str, stiffness: float, robot: str) -> tuple[Trial, ZmpRecord]:
     trial = trial_of(bench, gait, treatment, stiffness, robot=robot)
     if trial.zmp is None:
-        raise InputError(f"the run with treatment {treatment} tells no ZMP")
+        raise InputError(f"the run with treatment {treatment} has no ZMP")
     return trial, trial.zmp
 
 
 def _treated(trial: Trial) -> str:
-    told = {
+    names = {
         "none": "without compensation",
         "swing": "swing foot compensated",
         "joint": "joints compensated",
     }
     fell = "" if trial.fell_at is None else f", falls at {trial.fell_at:.1f} s"
-    return told.get(trial.treatment, "joints led by the walk's torques") + fell
+    return names.get(trial.treatment, "joints led by the walk's torques") + fell
 
 
-_ALL: tuple[Drawing, ...] = (
-    feet_along_x,
-    feet_along_z,
-    waist_along_x,
-    waist_along_y,
-    joint_angles,
-    walking,
-    planned,
-    zmp_along_x,
-    zmp_along_y,
-    seen_from_above,
-    reach_maps,
-    deflection_maps,
-    deflection_parts,
-    preview,
-    compensated_joints,
-    foot_from_waist,
-    compensated_foot,
-    sprung_zmp,
-    sprung_zmp_above,
-)
-
-DRAWINGS: Mapping[str, Drawing] = {drawing.__name__: drawing for drawing in _ALL}
+DRAWINGS: Mapping[str, Drawing] = {
+    "feet_along_x": _of_walk(motion.feet_along_x),
+    "feet_along_z": _of_walk(motion.feet_along_z),
+    "waist_along_x": _of_walk(motion.waist_along_x),
+    "waist_along_y": _of_walk(motion.waist_along_y),
+    "joint_angles": _of_walk(motion.joint_angles),
+    "walking": walking,
+    "planned": _of_walk(frames.frames_drawn),
+    "zmp_along_x": _of_walk(balance.zmp_against_gcom, axis=0),
+    "zmp_along_y": _of_walk(balance.zmp_against_gcom, axis=1),
+    "seen_from_above": _of_walk(balance.seen_from_above),
+    "reach_maps": reach_maps,
+    "deflection_maps": deflection_maps,
+    "deflection_parts": deflection_parts,
+    "preview": preview,
+    "compensated_joints": compensated_joints,
+    "foot_from_waist": commanded_foot,
+    "compensated_foot": compensated_foot,
+    "sprung_zmp": sprung_zmp,
+    "sprung_zmp_above": sprung_zmp_above,
+}
+"""Every drawing by the name that papers use."""

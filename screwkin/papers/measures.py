@@ -1,4 +1,4 @@
-"""All measures by name: each answers one kind of number that a paper tells."""
+"""All measures by name: each answers one kind of number that a paper prints."""
 
 from __future__ import annotations
 
@@ -14,10 +14,7 @@ Measure = Callable[..., Any]
 
 _ALL: tuple[Measure, ...] = (
     measures_table.mass,
-    measures_table.center_of_mass,
     measures_table.middle_of_link,
-    measures_table.place,
-    measures_table.distance,
     measures_table.axis,
     measures_table.limits,
     measures_table.sole,
@@ -30,28 +27,33 @@ _ALL: tuple[Measure, ...] = (
     measures_walk.key_points,
     measures_walk.feet_apart,
     measures_walk.swing_height,
-    measures_walk.balance,
     measures_walk.spike_phases,
     measures_walk.simulated,
-    measures_leg.ik,
     measures_leg.ik_ratio,
     measures_leg.reach,
     measures_leg.cut_at,
     measures_leg.deflection,
     measures_leg.gains,
-    measures_leg.tracking,
     measures_leg.compensation,
     measures_springs.on_springs,
 )
 
-MEASURES: Mapping[str, Measure] = {measure.__name__: measure for measure in _ALL}
-"""Measures take a ``Bench`` and named arguments, and give a value in SI units."""
+MEASURES: Mapping[str, Measure] = {
+    **{measure.__name__: measure for measure in _ALL},
+    "center_of_mass": measures_table.link_center,
+    "place": measures_table.zero_pose_place,
+    "distance": measures_table.zero_pose_distance,
+    "balance": measures_walk.balance_number,
+    "ik": measures_leg.ik_number,
+    "tracking": measures_leg.preview_tracking,
+}
+"""Measures take a ``Bench`` and named arguments, and return a value in SI units."""
 
 
 def check_call(
-    kind: str, name: str, known: Mapping[str, Callable[..., Any]], told: Mapping[str, object], where: str
+    kind: str, name: str, known: Mapping[str, Callable[..., Any]], given: Mapping[str, object], where: str
 ) -> None:
-    """Raise unless ``name`` is a known measure or drawing, and takes the arguments told beside the bench.
+    """Raise unless ``name`` is a known measure or drawing, and takes the arguments given beside the bench.
 
     Raises:
         UnknownNameError, InputError: what is wrong; ``where`` says in which row.
@@ -60,8 +62,8 @@ def check_call(
         raise UnknownNameError(f"{kind} of {where!r}", name, list(known))
     parameters = list(inspect.signature(known[name]).parameters.values())[1:]
     names = [parameter.name for parameter in parameters]
-    unknown = [one for one in told if one not in names]
-    missing = [p.name for p in parameters if p.default is p.empty and p.name not in told]
+    unknown = [one for one in given if one not in names]
+    missing = [p.name for p in parameters if p.default is p.empty and p.name not in given]
     parts = [f"unknown arguments {', '.join(unknown)}"] if unknown else []
     parts += [f"missing arguments {', '.join(missing)}"] if missing else []
     if parts:

@@ -16,18 +16,18 @@ from screwkin.gait.compensation import METHODS, Remaining, compensate, convergen
 from screwkin.gait.footsteps import footholds
 from screwkin.gait.preview import follow_reference, preview_gains
 from screwkin.gait.preview_plan import zmp_reference
-from screwkin.gait.realise import stance_of
+from screwkin.gait.stance import stance_of
 from screwkin.papers.bench import Bench
 from screwkin.trajectory import Trajectory
 
 
 def study_of(bench: Bench, limb: str, poses: int, robot: str = "") -> IkStudy:
-    """The comparison of inverse kinematics methods, made once."""
+    """The comparison of inverse kinematics methods, computed once."""
     table = bench.robot(robot)
     return bench.once(("ik", table.name, limb, poses), lambda: ik_study(table, limb, poses))
 
 
-def ik(
+def ik_number(
     bench: Bench, limb: str, method: str, key: str, data: str = "gait", poses: int = 2000, robot: str = ""
 ) -> float:
     """A number of an inverse kinematics method: iterations, share solved or in limits, or seconds."""
@@ -57,12 +57,12 @@ def _number(row: IkRow, key: str) -> float:
         return 1e-6 * row.microseconds
     value = getattr(row, key, None)
     if not isinstance(value, int | float):
-        raise InputError(f"inverse kinematics tell no number {key}")
+        raise InputError(f"a row of inverse kinematics has no number {key}")
     return value
 
 
 def map_of(bench: Bench, limb: str, height: float, resolution: float, robot: str = "") -> WorkspaceMap:
-    """The workspace of a limb at a height of the waist above its tip, made once."""
+    """The workspace of a limb at a height of the waist above its tip, computed once."""
     table = bench.robot(robot)
     key = ("workspace", table.name, limb, height, resolution)
     return bench.once(key, lambda: workspace(table, limb, [height], resolution)[0])
@@ -90,7 +90,7 @@ def cut_at(
 def sinking_of(
     bench: Bench, limb: str, height: float, stiffness: float, law: Law, resolution: float, robot: str = ""
 ) -> DeflectionMap:
-    """Deflection of a tip all over its workspace, made once."""
+    """Deflection of a tip all over its workspace, computed once."""
     table = bench.robot(robot)
     place = map_of(bench, limb, height, resolution, robot)
     key = ("stiffness", table.name, limb, height, stiffness, law, resolution)
@@ -112,17 +112,17 @@ def deflection(
     ``key``: median or max of its length; x, y or z for the range (2,) of a component; least_at for the place
     (2,) with the smallest one.
     """
-    found = sinking_of(bench, limb, height, stiffness, law, resolution, robot)
+    sunk = sinking_of(bench, limb, height, stiffness, law, resolution, robot)
     if key in ("median", "max"):
-        return float(getattr(np, f"nan{key}")(found.magnitude))
+        return float(getattr(np, f"nan{key}")(sunk.magnitude))
     if key == "least_at":
-        i, j = np.unravel_index(np.nanargmin(found.magnitude), found.magnitude.shape)
-        return np.array([found.place.x[i], found.place.y[j]])
+        i, j = np.unravel_index(np.nanargmin(sunk.magnitude), sunk.magnitude.shape)
+        return np.array([sunk.place.x[i], sunk.place.y[j]])
     if key not in ("x", "y", "z"):
         raise UnknownNameError(
             "number of a deflection map", key, ("median", "max", "x", "y", "z", "least_at")
         )
-    part = found.translation[..., "xyz".index(key)]
+    part = sunk.translation[..., "xyz".index(key)]
     return np.array([np.nanmin(part), np.nanmax(part)])
 
 
@@ -134,7 +134,7 @@ def gains(bench: Bench, key: str, settings: Mapping[str, float]) -> float | Arra
     return value
 
 
-def tracking(
+def preview_tracking(
     bench: Bench,
     gait: str,
     who: str,
@@ -175,7 +175,7 @@ def zmp_lines(
 def remaining_of(
     bench: Bench, gait: str, method: str, model: Law, stiffness: float, passes: int, robot: str = ""
 ) -> tuple[Remaining, ...]:
-    """What every pass of a compensation leaves, made once."""
+    """The residual after every pass of a compensation, computed once."""
     account = bench.account(gait, None, robot)
     chosen = next((known for known in METHODS if known == method), None)
     if chosen is None:
@@ -217,7 +217,7 @@ def compensation(
     what, _, part = key.partition(" ")
     if what not in ("before", "after", "removed") or part not in ("x", "y", "z", "norm"):
         raise InputError(
-            f"compensation tells no {key!r}; write before, after or removed, and x, y, z or norm"
+            f"compensation has no number {key!r}; write before, after or removed, and x, y, z or norm"
         )
     before, after = (
         1e-3 * (row.norm_mm if part == "norm" else row.largest_mm["xyz".index(part)])

@@ -54,7 +54,7 @@ def on_springs(
     """Median over the runs of the largest ZMP error ``x`` or ``y`` [m], or how many fell.
 
     ``cut`` is the share by which the median is below that without compensation, ``range`` the least and the
-    greatest. Runs that fall have no largest error: if all do, that is told.
+    greatest. Runs that fall have no largest error: if all do, the measure says so.
     """
     if key not in KEYS:
         raise UnknownNameError("number of walks on springs", key, KEYS)

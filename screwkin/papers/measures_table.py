@@ -37,17 +37,17 @@ def mass(bench: Bench, link: str = "", robot: str = "") -> float:
     return float(table.link(link).mass if link else table.mass)
 
 
-def center_of_mass(bench: Bench, link: str, robot: str = "") -> Array:
+def link_center(bench: Bench, link: str, robot: str = "") -> Array:
     """CoM (3,) [m] of a link in the zero pose."""
     return _vector(bench.robot(robot).link(link).com)
 
 
 def middle_of_link(bench: Bench, link: str, between: Sequence[str], robot: str = "") -> float:
     """Distance [m] of a link's CoM from the middle between two places."""
-    return float(np.linalg.norm(center_of_mass(bench, link, robot) - _middle(bench.robot(robot), between)))
+    return float(np.linalg.norm(link_center(bench, link, robot) - _middle(bench.robot(robot), between)))
 
 
-def place(bench: Bench, at: Sequence[str], seen_from: Sequence[str] = (), robot: str = "") -> Array:
+def zero_pose_place(bench: Bench, at: Sequence[str], seen_from: Sequence[str] = (), robot: str = "") -> Array:
     """Place (3,) [m] of a joint's axis point or a tip in the zero pose, or the middle between several.
 
     Seen from the base origin, or from the middle between other places.
@@ -56,7 +56,7 @@ def place(bench: Bench, at: Sequence[str], seen_from: Sequence[str] = (), robot:
     return _middle(table, at) - (_middle(table, seen_from) if seen_from else 0.0)
 
 
-def distance(bench: Bench, between: Sequence[str], along: str = "", robot: str = "") -> float:
+def zero_pose_distance(bench: Bench, between: Sequence[str], along: str = "", robot: str = "") -> float:
     """Distance [m] of two places in the zero pose, or of their coordinates along x, y or z."""
     first, second = (_place(bench.robot(robot), name) for name in between)
     gap = second - first
@@ -70,8 +70,8 @@ def axis(bench: Bench, joint: str, robot: str = "") -> Array:
 
 def limits(bench: Bench, joint: str, robot: str = "") -> Array:
     """Lower and upper limit (2,) of a joint [rad or m]."""
-    found = bench.robot(robot).joint(joint)
-    return np.array([found.lower, found.upper])
+    one = bench.robot(robot).joint(joint)
+    return np.array([one.lower, one.upper])
 
 
 def sole(bench: Bench, limb: str, robot: str = "") -> Array:
@@ -91,7 +91,7 @@ def size(bench: Bench, along: str = "xyz", link: str = "", robot: str = "") -> A
 
 
 def reference_error(bench: Bench, limb: str, reference: Sequence[str], robot: str = "") -> float:
-    """Largest difference of a tip's pose when its screws are told in another frame [1 and m].
+    """Largest difference of a tip's pose when its screws are expressed in another frame [1 and m].
 
     The frame stands in the middle between two places, with the axes of the base; the pose is
     A_base,reference times the successive displacements there times A_reference,tip.
@@ -101,11 +101,11 @@ def reference_error(bench: Bench, limb: str, reference: Sequence[str], robot: st
     if chain is None:
         raise UnknownNameError("limb", limb, [one.name for one in table.limbs])
     there = Pose(UNTURNED, vector_from_array(_middle(table, reference)))
-    told = screws_in(there, chain.screws)
+    moved = screws_in(there, chain.screws)
     q = random_positions(table, 1000, np.random.default_rng(0))
     values = [q[:, i] for i in chain.joints]
     tip, _ = by_screws(chain.screws, chain.frame, values)
-    other, _ = by_screws(told, there.inverse @ chain.frame, values)
+    other, _ = by_screws(moved, there.inverse @ chain.frame, values)
     return float(np.abs(as_array(tip) - as_array(there @ other)).max())
 
 
@@ -121,8 +121,7 @@ def mechanism(bench: Bench, key: str, robot: str = "") -> float | Sequence[float
 
 def comparison(bench: Bench, key: str, part: str = "", robot: str = "") -> float:
     """A number of the comparison of screws with DH tables."""
-    found = bench.comparison(robot).to_dict()
-    value = found.get(key)
+    value = bench.comparison(robot).to_dict().get(key)
     if part and isinstance(value, dict):
         for name in part.split("."):
             value = value[name]

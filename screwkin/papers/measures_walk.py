@@ -73,7 +73,7 @@ def swing_height(bench: Bench, gait: str, foot: str, steps: int | None = None, r
     return float(_path(bench.account(gait, steps, robot), foot)[:, 2].max())
 
 
-def balance(
+def balance_number(
     bench: Bench, key: str, gait: str, steps: int | None = None, changes: Changes = None, robot: str = ""
 ) -> float:
     """A number of a walk's balance: see ``BALANCE``; lengths in m."""
@@ -109,17 +109,17 @@ def simulated(
     sole_stiffness: float | None = None,
     robot: str = "",
 ) -> float | str:
-    """What the simulator says of a walk; lengths as the verdict tells them, truth as yes or no.
+    """What the simulator says of a walk; lengths as in the verdict, truth as yes or no.
 
     Soles are rigid unless ``sole_stiffness`` [N/m] of every point of contact is given.
     """
     account = bench.account(gait, steps, robot, changes)
-    found = bench.validation(account, sole_stiffness).to_dict()
-    if key == "fell_at" and found[key] is None:
+    verdict = bench.validation(account, sole_stiffness).to_dict()
+    if key == "fell_at" and verdict[key] is None:
         return "does not fall"
-    if key not in found or isinstance(found[key], dict | list | None):
-        raise InputError(f"a verdict has no single value {key}; it has {', '.join(found)}")
-    value: float | str = found[key]
+    if key not in verdict or isinstance(verdict[key], dict | list | None):
+        raise InputError(f"a verdict has no single value {key}; it has {', '.join(verdict)}")
+    value: float | str = verdict[key]
     return ("yes" if value else "no") if isinstance(value, bool) else value
 
 

@@ -18,7 +18,7 @@ from screwkin.papers.bench import Bench
 from screwkin.papers.claims import Paper, Picture
 from screwkin.papers.drawings import DRAWINGS
 from screwkin.papers.measures import check_call
-from screwkin.papers.reproduce import MARKS, Line, Measured, Reproduction, written
+from screwkin.papers.reproduce import MARKS, ClaimResult, Measured, Reproduction, written
 from screwkin.report.style import DPI, styled
 
 _COLOURS = 256
@@ -57,17 +57,17 @@ def draw_pictures(
     check_pictures(paper)
     total, done, drawn = sum(len(section.pictures) for section in paper.sections), 0, []
     for section in paper.sections:
-        made = []
+        shown = []
         for picture in section.pictures:
             path = folder / f"{done + 1:02}-{picture.draw.replace('_', '-')}.png"
             try:
                 _draw(picture, bench, path)
-                made.append(Drawn(path, picture.caption))
+                shown.append(Drawn(path, picture.caption))
             except MissingDependencyError:
                 pass
             done += 1
             progress(done / total)
-        drawn.append(made)
+        drawn.append(shown)
     return drawn
 
 
@@ -84,15 +84,15 @@ def _draw(picture: Picture, bench: Bench, path: Path) -> None:
 
 
 def write_pages(
-    found: Reproduction, pictures: Sequence[Sequence[Drawn]], folder: Path, command: str, versions: str
+    result: Reproduction, pictures: Sequence[Sequence[Drawn]], folder: Path, command: str, versions: str
 ) -> tuple[Path, Path]:
     """Write ``README.md``, which shows the pictures beside it, and ``report.html``, which holds them.
 
     Args:
-        found: the measured paper.
+        result: the measured paper.
         pictures: of every section, from ``draw_pictures``.
         folder: where the pages go, beside the pictures.
-        command: the command line that makes them.
+        command: the command line that writes them.
         versions: of what computed, in a line.
 
     Raises:
@@ -101,7 +101,10 @@ def write_pages(
     pages = folder / "README.md", folder / "report.html"
     for path, text in zip(
         pages,
-        (_markdown(found, pictures, command, versions), _html(found, pictures, command, versions)),
+        (
+            _markdown(result, pictures, command, versions),
+            _html(result, pictures, command, versions),
+        ),
         strict=True,
     ):
         with atomic_write(path) as file:
@@ -124,7 +127,7 @@ def _rows(measured: Measured) -> list[tuple[str, str, str, str, str]]:
     ]
 
 
-def _ours(line: Line) -> str:
+def _ours(line: ClaimResult) -> str:
     return written(line.ours, line.form) or "–"
 
 
@@ -132,11 +135,11 @@ def _title(measured: Measured) -> str:
     return f"{measured.section.place}: {measured.section.title}"
 
 
-def _markdown(found: Reproduction, pictures: Sequence[Sequence[Drawn]], command: str, versions: str) -> str:
-    paper = found.paper
-    parts = [f"# {paper.title}", f"*{paper.source}*", paper.text, found.summary]
+def _markdown(result: Reproduction, pictures: Sequence[Sequence[Drawn]], command: str, versions: str) -> str:
+    paper = result.paper
+    parts = [f"# {paper.title}", f"*{paper.source}*", paper.text, result.summary]
     parts += [f"Made by\n\n```\n{command}\n```\n\nwith {versions}."]
-    for measured, drawn in zip(found.sections, pictures, strict=True):
+    for measured, drawn in zip(result.sections, pictures, strict=True):
         parts += [f"## {_title(measured)}", measured.section.text]
         if measured.lines:
             rows = [_HEAD, ("---",) * len(_HEAD), *_rows(measured)]
@@ -153,17 +156,17 @@ def _plain(text: str) -> str:
     return text.replace("`", "").replace("[", "(").replace("]", ")")
 
 
-def _html(found: Reproduction, pictures: Sequence[Sequence[Drawn]], command: str, versions: str) -> str:
-    paper = found.paper
+def _html(result: Reproduction, pictures: Sequence[Sequence[Drawn]], command: str, versions: str) -> str:
+    paper = result.paper
     body = [
         f"<h1>{_text(paper.title)}</h1>",
         f'<p class="soft">{_text(paper.source)}</p>',
         f"<p>{_text(paper.text)}</p>",
-        f'<div class="verdict good"><strong>{_text(found.summary)}</strong></div>',
+        f'<div class="verdict good"><strong>{_text(result.summary)}</strong></div>',
         f"<pre>{escape(command)}</pre>",
         f'<p class="soft">{escape(versions)}</p>',
     ]
-    for measured, drawn in zip(found.sections, pictures, strict=True):
+    for measured, drawn in zip(result.sections, pictures, strict=True):
         body.append(f"<h2>{_text(_title(measured))}</h2>")
         if measured.section.text:
             body.append(f"<p>{_text(measured.section.text)}</p>")
@@ -200,8 +203,8 @@ def _embedded(path: Path) -> str:
 def _style() -> str:
     """The style sheet of all reports, and what this page has besides."""
     page = files("screwkin.report").joinpath("page.html").read_text(encoding="utf-8")
-    found: Any = re.search(r"<style>\n(.*?)</style>", page, re.DOTALL)
-    return str(found.group(1)) + _OWN_STYLE
+    style: Any = re.search(r"<style>\n(.*?)</style>", page, re.DOTALL)
+    return str(style.group(1)) + _OWN_STYLE
 
 
 _OWN_STYLE = """\

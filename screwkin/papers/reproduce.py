@@ -10,22 +10,22 @@ import numpy as np
 
 from screwkin.errors import MissingDependencyError
 from screwkin.papers.bench import Bench
-from screwkin.papers.claims import UNITS, Paper, Row, Section, Value
+from screwkin.papers.claims import UNITS, Claim, Paper, Section, Value
 from screwkin.papers.measures import MEASURES, check_call
 
 MARKS = {True: "same", False: "differs", None: ""}
-"""How a row's agreement is told."""
+"""How a row's agreement is written."""
 
 Progress = Callable[[float], None]
 
 
 @dataclass(frozen=True)
-class Line:
+class ClaimResult:
     """One row of a reproduction.
 
     Attributes:
         item: table, figure or claim of the paper, with the unit.
-        paper: what is printed; None where the paper gives no value.
+        paper: what is printed; None where the paper prints no value.
         ours: what was measured; None if a package for it is absent.
         note: where and why they differ, or how ours is meant.
         agrees: whether they are equal, within what the row allows; None if they cannot be compared.
@@ -55,7 +55,7 @@ class Measured:
     """A section of a paper with its rows measured."""
 
     section: Section
-    lines: tuple[Line, ...]
+    lines: tuple[ClaimResult, ...]
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class Reproduction:
     sections: tuple[Measured, ...]
 
     @property
-    def lines(self) -> tuple[Line, ...]:
+    def lines(self) -> tuple[ClaimResult, ...]:
         """All rows."""
         return tuple(line for measured in self.sections for line in measured.lines)
 
@@ -99,8 +99,8 @@ def reproduce(paper: Paper, bench: Bench, progress: Progress = lambda share: Non
 
     Args:
         paper: from ``load_paper``.
-        bench: where robots, walks and studies are made and kept.
-        progress: told the share of rows done.
+        bench: where robots, walks and studies are computed and cached.
+        progress: called with the share of rows done.
 
     Raises:
         UnknownNameError, InputError: a row names no measure, or wrong arguments.
@@ -117,19 +117,19 @@ def reproduce(paper: Paper, bench: Bench, progress: Progress = lambda share: Non
     return Reproduction(paper, tuple(sections))
 
 
-def _item(section: Section, row: Row) -> str:
+def _item(section: Section, row: Claim) -> str:
     unit = f" [{row.unit}]" if row.unit else ""
     return f"{section.place}: {row.item}{unit}"
 
 
-def _measured(section: Section, row: Row, bench: Bench) -> Line:
+def _measured(section: Section, row: Claim, bench: Bench) -> ClaimResult:
     item, form = _item(section, row), row.form
     try:
         value = MEASURES[row.measure](bench, **row.with_)
     except MissingDependencyError as error:
-        return Line(item, row.paper, None, f"not measured: {error}", None, form)
+        return ClaimResult(item, row.paper, None, f"not measured: {error}", None, form)
     ours = _scaled(value, UNITS.get(row.unit, 1.0))
-    return Line(item, row.paper, ours, row.note, agreement(row.paper, ours, row.within), form)
+    return ClaimResult(item, row.paper, ours, row.note, agreement(row.paper, ours, row.within), form)
 
 
 def _scaled(value: Value, factor: float) -> Value:

@@ -124,10 +124,10 @@ def _label_spikes(axes: Axes, spikes: Sequence[Spike], time: Array, value: Array
     at = [int(np.abs(time - spike.time).argmin()) for spike in spikes]
     if at:
         axes.plot(time[at], value[at], "o", color=ZMP, markersize=3, label="spike, with its time [s]")
-    told: list[Spike] = []
+    chosen: list[Spike] = []
     for spike, i in sorted(zip(spikes, at, strict=True), key=lambda pair: -pair[0].distance):
-        if all(abs(spike.time - other.time) > _APART * duration for other in told):
-            told.append(spike)
+        if all(abs(spike.time - other.time) > _APART * duration for other in chosen):
+            chosen.append(spike)
             up = value[i] >= 0
             axes.annotate(
                 f"{spike.time:.2f}",

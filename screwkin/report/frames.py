@@ -85,18 +85,18 @@ def _outlines(robot: Robot, T_world_base: Array, q: Array) -> list[tuple[str, fl
     forward = np.append(heading / max(float(np.linalg.norm(heading)), 1e-9), 0.0)
     view = np.array([forward, [0.0, 0.0, 1.0], np.array([-forward[1], forward[0], 0.0])])
     origin = np.array([T_world_base[0, 3], T_world_base[1, 3], 0.0])
-    found = []
+    sides = []
     for link, pose in zip(robot.links, poses, strict=True):
         D = as_array(pose)
         for points in _solids(robot, link.name):
             seen = (points @ D[:3, :3].T + D[:3, 3] - origin) @ view.T
             flat = convex_hull(seen[:, :2]) if len(points) == 8 else seen[:, :2]
-            found.append((link.name, float(seen[:, 2].mean()), flat))
-    return found
+            sides.append((link.name, float(seen[:, 2].mean()), flat))
+    return sides
 
 
 def _solids(robot: Robot, name: str) -> list[Array]:
-    """Corners (8, 3) of a link's boxes; without boxes the ends (2, 3) of the lines that it bears."""
+    """Corners (8, 3) of a link's boxes; without boxes the ends (2, 3) of the lines to its joints."""
     boxes = robot.link(name).boxes
     if boxes:
         signs = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, -1).T

@@ -1,4 +1,4 @@
-"""Pictures of maps over a workspace seen from above: what is reached, what cuts, and how far a tip yields."""
+"""Pictures of maps over a workspace seen from above: what is reached, what cuts, how far a tip sinks."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def deflection_overview(robot: Robot, maps: Sequence[DeflectionMap]) -> Figure:
 
 
 def _sinking(robot: Robot, one: DeflectionMap) -> str:
-    return f"{robot.name} on its {shown(one.support)}: how the {shown(one.place.tip)} yields"
+    return f"{robot.name} on its {shown(one.support)}: deflection of the {shown(one.place.tip)}"
 
 
 def _springs(one: DeflectionMap) -> str:

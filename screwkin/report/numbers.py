@@ -33,7 +33,7 @@ def balance_data(account: Account) -> dict[str, Any]:
 
 
 def walk_data(account: Account) -> dict[str, Any]:
-    """What ``walk`` tells of a trajectory, as JSON data."""
+    """The numbers that ``walk`` reports of a trajectory, as JSON data."""
     trajectory = account.trajectory
     return {
         "robot": account.robot.name,
@@ -69,7 +69,7 @@ def balance_numbers(account: Account) -> list[Number]:
 
 
 def walk_numbers(account: Account) -> list[Number]:
-    """What ``walk`` tells of a trajectory."""
+    """The numbers that ``walk`` reports of a trajectory."""
     trajectory = account.trajectory
     steps = "" if account.steps is None else f"{account.steps} steps"
     rows = [
@@ -93,7 +93,7 @@ def walk_numbers(account: Account) -> list[Number]:
 
 
 def validation_numbers(check: Validation) -> list[Number]:
-    """What a simulation tells."""
+    """The numbers of a simulation."""
     rows = [
         Number("engine", check.engine),
         Number("fell", "no" if check.fell_at is None else f"at {check.fell_at:.2f} s"),
@@ -113,9 +113,11 @@ def validation_numbers(check: Validation) -> list[Number]:
         )
     if check.joint_stiffness is not None:
         k = sorted(set(check.joint_stiffness.values()))
-        told = f"{k[0]:g}" if len(k) == 1 else f"{k[0]:g} to {k[-1]:g}"
+        values = f"{k[0]:g}" if len(k) == 1 else f"{k[0]:g} to {k[-1]:g}"
         rows.append(
-            Number("elastic servos", f"{told} N m/rad", f"compensation in the commands: {check.compensation}")
+            Number(
+                "elastic servos", f"{values} N m/rad", f"compensation in the commands: {check.compensation}"
+            )
         )
     if check.sole_stiffness is not None:
         rows.append(Number("elastic soles", f"{check.sole_stiffness:g} N/m", "at every point of contact"))
@@ -123,7 +125,7 @@ def validation_numbers(check: Validation) -> list[Number]:
 
 
 def _repetitions(check: Validation) -> list[Number]:
-    """What runs under other frictions and time steps tell."""
+    """The numbers of runs under other frictions and time steps."""
     row = check.repeated
     if row is None:
         return []
@@ -148,5 +150,5 @@ def _times(account: Account, most: int = 12) -> str:
     spikes = account.balance.spikes
     if not spikes:
         return ""
-    told = ", ".join(f"{spike.time:.2f}" for spike in spikes[:most])
-    return f"at {told}{', …' if len(spikes) > most else ''} s"
+    times = ", ".join(f"{spike.time:.2f}" for spike in spikes[:most])
+    return f"at {times}{', …' if len(spikes) > most else ''} s"

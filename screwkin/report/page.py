@@ -42,11 +42,11 @@ def write_page(
 
     Args:
         path: of the HTML file.
-        account: what is told.
+        account: of the trajectory.
         pictures: as ``save_pictures`` wrote them; they are embedded.
         check: the verdict of a simulation.
         film: an animated picture to embed.
-        commands: command lines that made it; default: the one recorded in the trajectory.
+        commands: command lines that produced it; default: the one recorded in the trajectory.
 
     Raises:
         OutputError: the file cannot be written.
@@ -69,7 +69,7 @@ def _parts(
     name = str(gait.get("name", "unknown"))
     steps = "" if account.steps is None else f", {account.steps} steps"
     tone, verdict, remarks = _verdict(account, check)
-    told = commands or [str(account.trajectory.meta.get("command", "")) or "(not recorded)"]
+    lines = commands or [str(account.trajectory.meta.get("command", "")) or "(not recorded)"]
     return {
         "title": escape(f"{robot.name}: gait {name}{steps}"),
         "subtitle": escape(str(gait.get("description", ""))),
@@ -85,16 +85,16 @@ def _parts(
         "screws": _screws(robot),
         "gait": escape(f"{name}: {gait.get('description', '')}"),
         "parameters": _parameters(account),
-        "command": escape("\n".join(told)),
+        "command": escape("\n".join(lines)),
         "versions": _made_with(account),
     }
 
 
 def _gait(account: Account, table: str = "gait") -> dict[str, Any]:
-    """A table of the gait that made the trajectory; empty where it is not recorded."""
+    """A table of the gait of the trajectory; empty where it is not recorded."""
     gait = account.trajectory.meta.get("gait")
-    found = gait.get(table) if isinstance(gait, dict) else None
-    return found if isinstance(found, dict) else {}
+    values = gait.get(table) if isinstance(gait, dict) else None
+    return values if isinstance(values, dict) else {}
 
 
 def _verdict(account: Account, check: Validation | None) -> tuple[str, str, list[str]]:
@@ -186,12 +186,12 @@ def _screws(robot: Robot) -> str:
 
 def _parameters(account: Account) -> str:
     """The gait's parameters, then those of its own file."""
-    told = ("name", "description", "source")
+    shown_above = ("name", "description", "source")
     values = {**_gait(account), **_gait(account, "parameters")}
     rows = [
         (key, f"{value:g}" if isinstance(value, float) else str(value), _UNITS.get(key, ""))
         for key, value in values.items()
-        if key not in told
+        if key not in shown_above
     ]
     return _table(rows, classes=("", "value", "soft"))
 

@@ -1,4 +1,4 @@
-"""All pictures of a report, in the order in which they are told."""
+"""All pictures of a report, in their order on the page."""
 
 from __future__ import annotations
 
@@ -54,8 +54,8 @@ def save_servo_pictures(account: Account, folder: Path, log: PlayLog) -> list[Sa
         OutputError: a file cannot be written.
     """
     caption = (
-        "What the servos were told (lines) and what they answered (dots), joint by joint of the legs; below, "
-        "how far every joint was from its goal."
+        "What was commanded to the servos (lines) and what they answered (dots), joint by joint of the legs; "
+        "below, how far every joint was from its goal."
     )
     return _saved([Plot("tracking", "The servos", caption, lambda: servos.tracking(account, log))], folder)
 
@@ -108,14 +108,14 @@ def _motion(account: Account) -> list[Plot]:
         Plot(
             "feet_x",
             the_walk,
-            "Feet along x (the paper's figure 6): each swings while the other bears.",
+            "Feet along x (the paper's figure 6): each swings while the other stands.",
             lambda: motion.feet_along_x(account),
         ),
         Plot("feet_z", the_walk, "Height of the feet (figure 7).", lambda: motion.feet_along_z(account)),
         Plot(
             "waist_x",
             the_walk,
-            "The waist along x (figure 8), and its speed: jumps of its slope make ZMP spikes.",
+            "The waist along x (figure 8), and its speed: jumps of its slope cause ZMP spikes.",
             lambda: motion.waist_along_x(account),
         ),
         Plot(

@@ -17,7 +17,7 @@ Figure = Any
 Axes = Any
 
 SIDES = ("#D55E00", "#0072B2", "#009E73", "#8B5FBF", "#997700", "#CC3377")
-"""Colours of limbs of one kind in table order: right and left are told apart also by the colour-blind."""
+"""Colours of limbs of one kind in table order: right and left are distinct for the colour-blind too."""
 WAIST, GCOM, ZMP, MEASURED, PLAIN, GOOD = "#333333", "#009E73", "#AA3377", "#E69F00", "#555555", "#E8EEE8"
 LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)))
 

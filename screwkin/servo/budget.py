@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from screwkin.servo.profiles import Profile
+from screwkin.servo.protocols import codec
 
 _BITS = 10  # per byte on the line
 ADAPTER = 1e-3  # s that a USB adapter adds to a reply once its latency timer is 1 ms
@@ -14,7 +15,7 @@ _FARTHEST = 24  # bytes that are read along to have the torque registers in the 
 
 
 def block_of(profile: Profile) -> tuple[int, int, tuple[str, ...]]:
-    """Address and length of the bytes that are read of a servo in a play, and the registers in them."""
+    """Address and length of the bytes that are read from a servo in a play, and the registers in them."""
     names = [name for name in (*BLOCK, *HEALTH) if name in profile.registers]
     end = max(profile.register(name).end for name in names)
     names = [name for name in names if end - profile.register(name).address <= _FARTHEST]
@@ -57,12 +58,12 @@ def budget(
         adapter: time [s] that the adapter adds to an answer.
     """
     byte = _BITS / baud
-    asked, answered, sync = (8, 6, 8) if profiles[0].protocol == 1.0 else (14, 11, 14)
+    facts = codec(profiles[0].protocol).FACTS
     goals = sum(
         1 + profile.register("goal_position").width + profile.register("moving_speed").width
         for profile in profiles
     )
     packets = len({profile.model for profile in profiles})
     longest = max(block_of(profile)[1] for profile in profiles)
-    read = (asked + answered + longest) * byte + return_delay + adapter
-    return Budget((goals + packets * sync) * byte, read, len(profiles))
+    read = (facts.read_size + facts.answer_size + longest) * byte + return_delay + adapter
+    return Budget((goals + packets * facts.sync_size) * byte, read, len(profiles))

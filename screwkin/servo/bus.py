@@ -1,7 +1,7 @@
 """The servo bus: the makers' driver, ``dynamixel_sdk``, behind one small interface.
 
-Only this file imports the driver and pyserial, when a bus is opened. The driver makes and reads the
-packets of both protocols; here are its time-outs (on a clock that may be a simulated one), its retries with a
+Only this file imports the driver and pyserial, when a bus is opened. The driver writes and reads the
+packets of all protocols; here are its time-outs (on a clock that may be a simulated one), its retries with a
 bound, the names of its error bits, and statistics of its round trips.
 """
 
@@ -13,15 +13,13 @@ from typing import Any, Literal
 
 from screwkin.errors import InputError, MissingDependencyError, ScrewkinError
 from screwkin.servo.line import (
-    BITS,
     BROADCAST,
-    NUMBERS,
     REFUSED,
     BusError,
+    ByteLine,
     Clock,
     DamagedError,
     ErrorBit,
-    Line,
     LineLostError,
     MonotonicClock,
     PortError,
@@ -29,6 +27,7 @@ from screwkin.servo.line import (
     Reply,
     Statistics,
 )
+from screwkin.servo.protocols import codec
 
 _MOST_NOISE = 4096  # bytes of one reply that are waited through before a babbling line counts as silent
 _BITS_PER_BYTE = 10  # a start bit, eight data bits and a stop bit
@@ -41,7 +40,7 @@ Grouped = Literal["none", "sync", "bulk"]
 class _Port:
     """What the driver takes for its port: a line and a clock."""
 
-    def __init__(self, line: Line, clock: Clock, baud: int, patience: float) -> None:
+    def __init__(self, line: ByteLine, clock: Clock, baud: int, patience: float) -> None:
         self.line, self.clock, self.baud, self.patience = line, clock, baud, patience
         self.is_open, self.is_using = True, False
         self.deadline, self.taken = clock.now(), 0
@@ -98,7 +97,7 @@ class Bus:
 
     def __init__(
         self,
-        line: Line,
+        line: ByteLine,
         protocol: float = 1.0,
         baud: int = 1_000_000,
         clock: Clock | None = None,
@@ -113,6 +112,8 @@ class Bus:
         self._sdk = sdk
         self._port = _Port(line, self.clock, baud, patience)
         self._handler = sdk.PacketHandler(protocol)
+        self._codec = codec(protocol)
+        self._facts = self._codec.FACTS
 
     @property
     def patience(self) -> float:
@@ -193,28 +194,28 @@ class Bus:
     def read_many(
         self, ids: Sequence[int], address: int, length: int, grouped: Grouped = "none"
     ) -> dict[int, Reply]:
-        """Bytes at one address of several servos; those that gave no sound reply are left out.
+        """Bytes at one address of several servos; those without a sound reply are left out.
 
         Args:
             ids: of the servos.
             address: first byte of each servo's table.
             length: number of bytes.
-            grouped: ask all in one packet, where all of them know it (an AX-12 knows none); who does not
+            grouped: ask all in one packet, where all of them support it (an AX-12 does not); who does not
                 answer to it is asked alone.
 
         Raises:
             LineLostError: the port is gone.
         """
-        found = self._grouped(ids, address, length, grouped) if grouped != "none" and len(ids) > 1 else {}
+        replies = self._grouped(ids, address, length, grouped) if grouped != "none" and len(ids) > 1 else {}
         for id in ids:
-            if id not in found:
+            if id not in replies:
                 try:
-                    found[id] = self.read(id, address, length)
+                    replies[id] = self.read(id, address, length)
                 except LineLostError:
                     raise
                 except BusError:
                     continue
-        return {id: found[id] for id in ids if id in found}
+        return {id: replies[id] for id in ids if id in replies}
 
     def _grouped(self, ids: Sequence[int], address: int, length: int, grouped: Grouped) -> dict[int, Reply]:
         """The replies to one sync or bulk read, up to the first that is missing."""
@@ -224,7 +225,7 @@ class Bus:
         else:
             rows = [number for id in ids for number in (length, id, address)]
             self._send(lambda: self._handler.bulkReadTx(self._port, rows, len(rows)))
-        found: dict[int, Reply] = {}
+        replies: dict[int, Reply] = {}
         for id in ids:
             self.statistics.exchanges += 1
             began = self.clock.now()
@@ -234,8 +235,8 @@ class Bus:
                 self.statistics.failed += 1
                 break
             self.statistics.answered(self.clock.now() - began)
-            found[id] = Reply(id, bytes(data), self._named(int(error)))
-        return found
+            replies[id] = Reply(id, bytes(data), self._codec.errors(int(error)))
+        return replies
 
     def _ask(self, id: int, address: int, length: int) -> tuple[bytes, int, int]:
         result = self._handler.readTx(self._port, id, address, length)
@@ -246,16 +247,15 @@ class Bus:
 
         The driver's own reads take the checksum for data when a packet is shorter than was asked for.
         """
-        # Place and width of the length, place of the error byte, bytes that the length counts besides.
-        at, width, error, around = (3, 1, 4, 2) if self.protocol == 1.0 else (5, 2, 8, 4)
-        options = () if self.protocol == 1.0 else (False,)
+        at, error = self._facts.length_at, self._facts.error_at
         result = self._sdk.COMM_RX_TIMEOUT
         for _ in range(_MOST_STRANGERS):
-            packet, result = self._handler.rxPacket(self._port, *options)
+            packet, result = self._handler.rxPacket(self._port, *self._facts.driver_options)
             if result != self._sdk.COMM_SUCCESS:
                 break
-            if packet[4 if self.protocol == 2.0 else 2] == id:
-                count = int.from_bytes(bytes(packet[at : at + width]), "little") - around
+            if packet[self._facts.id_at] == id:
+                length = bytes(packet[at : at + self._facts.length_width])
+                count = int.from_bytes(length, "little") - self._facts.counted
                 return bytes(packet[error + 1 : error + 1 + max(0, count)]), result, packet[error]
         return b"", result, 0
 
@@ -270,7 +270,7 @@ class Bus:
     ) -> tuple[Any, frozenset[ErrorBit]]:
         """Payload and errors of a sound reply, after as many tries as are allowed."""
         if not 0 <= id < BROADCAST - 1:
-            raise InputError(f"id {id} is none of a servo; ids go from 0 to {BROADCAST - 2}")
+            raise InputError(f"invalid servo id {id}; expected 0 to {BROADCAST - 2}")
         self.statistics.exchanges += 1
         result, errors = self._sdk.COMM_RX_TIMEOUT, frozenset[ErrorBit]()
         for attempt in range(1 + self.retries):
@@ -278,7 +278,7 @@ class Bus:
             began = self.clock.now()
             answer = self._try(act)
             payload, result, error = answer if isinstance(answer, tuple) else (None, answer, 0)
-            errors = self._named(int(error))
+            errors = self._codec.errors(int(error))
             short = length and (payload is None or len(payload) != length)
             refused = bool(errors & REFUSED)
             if result == self._sdk.COMM_SUCCESS and "checksum" not in errors and (refused or not short):
@@ -288,10 +288,10 @@ class Bus:
             self.statistics.silent += silent
             self.statistics.corrupt += not silent
         self.statistics.failed += 1
-        told = f"to a {what}, tried {1 + self.retries} times"
+        tried = f"to a {what}, tried {1 + self.retries} times"
         if result == self._sdk.COMM_RX_TIMEOUT:
-            raise BusError(f"servo {id} does not answer {told}", id)
-        raise DamagedError(f"servo {id} answers with damaged packets {told}", id)
+            raise BusError(f"servo {id} does not answer {tried}", id)
+        raise DamagedError(f"servo {id} answers with damaged packets {tried}", id)
 
     def _try(self, act: Callable[[], Any]) -> Any:
         """The driver's answer; bytes that it stumbles over are a damaged packet."""
@@ -302,21 +302,13 @@ class Bus:
         finally:
             self._port.is_using = False
 
-    def _named(self, error: int) -> frozenset[ErrorBit]:
-        if self.protocol == 2.0:
-            number: frozenset[ErrorBit] = frozenset(
-                {NUMBERS[error & 0x7F]} if error & 0x7F in NUMBERS else ()
-            )
-            return number | {"hardware"} if error & 0x80 else number
-        return frozenset(name for bit, name in enumerate(BITS) if error >> bit & 1)
-
     def _heed(self, id: int, doing: str, errors: frozenset[ErrorBit]) -> None:
         if errors & REFUSED:
             named = ", ".join(sorted(errors & REFUSED))
             raise RefusedError(f"servo {id} refused ({named} error) {doing}", id, errors)
 
 
-def open_line(port: str, baud: int = 1_000_000, rs485: bool = False) -> Line:
+def open_line(port: str, baud: int = 1_000_000, rs485: bool = False) -> ByteLine:
     """A serial port, ours alone.
 
     Args:
@@ -343,7 +335,7 @@ def open_line(port: str, baud: int = 1_000_000, rs485: bool = False) -> Line:
         raise PortError(
             f"cannot open port {port}: {error}. Ports found: {there}; permissions: docs/hardware.md"
         ) from None
-    opened: Line = line
+    opened: ByteLine = line
     return opened
 
 

@@ -27,16 +27,16 @@ def zeros(servos: ServoMap, angles: Mapping[str, float], q: Sequence[float]) -> 
     Raises:
         InputError: a servo stands more than half a turn from where it should; its direction may be wrong.
     """
-    found = {
+    zeros = {
         servo.joint: angles[servo.joint] - servo.direction * angle
         for servo, angle in zip(servos.joints, q, strict=True)
     }
-    wrong = [f"{joint} by {zero:.2f} rad" for joint, zero in found.items() if abs(zero) > math.pi]
+    wrong = [f"{joint} by {zero:.2f} rad" for joint, zero in zeros.items() if abs(zero) > math.pi]
     if wrong:
         raise InputError(
             f"servos are off by more than half a turn: {', '.join(wrong)}; is the robot in that posture?"
         )
-    return {joint: round(zero, 6) for joint, zero in found.items()}
+    return {joint: round(zero, 6) for joint, zero in zeros.items()}
 
 
 def calibrated(robot: Robot, zero: Mapping[str, float], flip: Sequence[str] = ()) -> str:
@@ -63,13 +63,14 @@ def calibrated(robot: Robot, zero: Mapping[str, float], flip: Sequence[str] = ()
         again = parse_robot(text, robot.path or robot.name)
     except InputError as error:
         again = replace(robot, servos={})
-        told = f" ({error})"
+        reason = f" ({error})"
     else:
-        told = ""
+        reason = ""
     if dict(again.servos) != wanted:
         lines = "\n".join(f"{joint} = {value!r}" for joint, value in zero.items())
         raise InputError(
-            f"{robot.path}: [servos] is written in a way that cannot be edited{told}; write there yourself:\n"
+            f"{robot.path}: [servos] is written in a way that cannot be edited{reason}; "
+            "write there yourself:\n"
             f"[servos.zero]\n{lines}"
         )
     return text

@@ -63,13 +63,13 @@ class Bounds:
         Args:
             robot: its joints' limits.
             servos: of the robot; by default as its table has them.
-            torque: greatest share of what each joint may give, 0 to 1.
+            torque: greatest share of each joint's torque that is allowed, 0 to 1.
 
         Raises:
             SafetyError: torque is no share, or a joint has no room left to move.
         """
         if not 0.0 <= torque <= 1.0:
-            raise SafetyError(f"torque limit {torque!r} is no share of the servo's; give one from 0 to 1")
+            raise SafetyError(f"torque limit {torque!r} is not a share of the servo's; expected 0 to 1")
         mounted = (servos or ServoMap.of(robot)).joints
         profiles = tuple(servo.profile for servo in mounted)
         scale = np.array([servo.direction * servo.profile.tick for servo in mounted])
@@ -89,7 +89,7 @@ class Bounds:
         if not (speed >= 1).all():
             k = int((speed < 1).argmax())
             raise SafetyError(
-                f"{robot.joint_names[k]}: {rate[k]:.4g} rad/s is less than its servo can be told"
+                f"{robot.joint_names[k]}: {rate[k]:.4g} rad/s is less than its servo's smallest speed"
             )
         most = [profile.register("moving_speed").high for profile in profiles]
         share = [torque * min(1.0, joint.effort / profile.stall_torque) for joint, profile in pairs]
@@ -130,7 +130,7 @@ class Bounds:
             exact = q / self.scale + self.zero
             bad = ~((exact >= self.lower - _ROUNDING) & (exact <= self.upper + _ROUNDING))
         if bad.any():
-            raise SafetyError("goals beyond limits: " + "; ".join(self._told(q, bad)))
+            raise SafetyError("goals beyond limits: " + "; ".join(self._named(q, bad)))
         return np.clip(np.rint(exact), self.low, self.high).astype(np.int64)
 
     def radians(self, ticks: Any) -> Array:
@@ -145,7 +145,7 @@ class Bounds:
         """The nearest joint positions (..., n) [rad] that may be written."""
         return self.radians(np.clip(np.asarray(q) / self.scale + self.zero, self.low, self.high))
 
-    def _told(self, q: Array, bad: NDArray[np.bool_]) -> list[str]:
+    def _named(self, q: Array, bad: NDArray[np.bool_]) -> list[str]:
         rows, wrong = q.reshape(-1, len(self.ids)), bad.reshape(-1, len(self.ids))
         ends = np.sort([self.radians(self.lower), self.radians(self.upper)], axis=0)
         return [
@@ -168,7 +168,7 @@ class Gate:
         self._last: Array | None = None
 
     def goals(self, q: Array, dt: float = math.inf) -> Ticks:
-        """Send every servo to its position, at most at its greatest speed; gives the positions [ticks].
+        """Send every servo to its position, at most at its greatest speed; returns positions (n,) [ticks].
 
         Args:
             q: joint positions (n,) [rad].
@@ -184,7 +184,7 @@ class Gate:
         return ticks
 
     def stay(self, ticks: Mapping[int, int]) -> dict[int, int]:
-        """Goals at measured positions [ticks] by joint index, within limits; gives what was written."""
+        """Goals at measured positions [ticks] by joint index, within limits; returns what was written."""
         chosen = sorted(ticks)
         values = np.array(self.bounds.low)
         for k in chosen:
@@ -201,7 +201,7 @@ class Gate:
             SafetyError: no share from 0 to 1.
         """
         if not 0.0 <= share <= 1.0:
-            raise SafetyError(f"torque limit {share!r} is no share; give one from 0 to 1")
+            raise SafetyError(f"torque limit {share!r} is not a share; expected 0 to 1")
         values = np.floor(share * self.bounds.torque + _ROUNDING).astype(np.int64)
         self._write({"torque_limit": values}, range(len(values)))
 
@@ -218,12 +218,12 @@ class Gate:
         rate = np.abs(q - self._last) / dt
         fast = np.flatnonzero(rate > self.bounds.rate * (1 + _SPEED_ROUNDING))
         if len(fast):
-            told = [
+            named = [
                 f"{self.bounds.names[k]} (servo {self.bounds.ids[k]}) at {rate[k]:.2f} rad/s, "
                 f"at most {self.bounds.rate[k]:.2f}"
                 for k in fast
             ]
-            raise SafetyError("goals too far from the last ones: " + "; ".join(told))
+            raise SafetyError("goals too far from the last ones: " + "; ".join(named))
 
     def _write(self, values: Mapping[str, Ticks], chosen: Sequence[int]) -> None:
         """The only writer of goals: registers that lie side by side go in one packet per servo model."""

@@ -103,7 +103,7 @@ class _Reader:
         """A register of the servo of joint k, or None without an answer.
 
         Raises:
-            LineLostError: several in a row gave none.
+            LineLostError: several in a row are missing.
         """
         register = self.gate.bounds.profiles[k].register(name)
         try:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -13,34 +12,14 @@ from screwkin.errors import InputError, NoSolutionError
 ErrorBit = Literal[
     "voltage", "angle limit", "overheat", "range", "checksum", "overload", "instruction", "hardware", "access"
 ]
-BITS: tuple[ErrorBit, ...] = (
-    "voltage",
-    "angle limit",
-    "overheat",
-    "range",
-    "checksum",
-    "overload",
-    "instruction",
-)
-"""Bits 0 to 6 of the error byte of protocol 1.0."""
-NUMBERS: Mapping[int, ErrorBit] = {
-    1: "instruction",
-    2: "instruction",
-    3: "checksum",
-    4: "range",
-    5: "range",
-    6: "range",
-    7: "access",
-}
-"""Error numbers of protocol 2.0; its bit 7 is an alert of the hardware."""
 REFUSED: frozenset[ErrorBit] = frozenset(("angle limit", "range", "instruction", "access"))
-"""Errors that tell that a command was not carried out; the others are about the servo's health."""
+"""Errors of a command that was not carried out; the others are about the servo's health."""
 
 BROADCAST = 0xFE
 
 
 class BusError(NoSolutionError, OSError):
-    """A servo does not answer, or not with sense; ``id`` tells which."""
+    """The servo ``id`` does not answer, or not with sense."""
 
     def __init__(self, message: str, id: int = -1) -> None:
         self.id = id
@@ -67,7 +46,7 @@ class RefusedError(BusError):
         super().__init__(message, id)
 
 
-class Line(Protocol):
+class ByteLine(Protocol):
     """Bytes out and in; a pyserial port with ``timeout=0`` is one."""
 
     def write(self, data: bytes) -> int | None:

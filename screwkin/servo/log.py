@@ -87,7 +87,7 @@ class Log:
 
 @dataclass(frozen=True, eq=False)
 class PlayLog:
-    """What a log tells of the motion: F frames of n joints.
+    """The motion as a log records it: F frames of n joints.
 
     time (F,) [s] from the start of the play; trajectory_time (F,) [s], NaN before and after the trajectory;
     command (F, n) [rad]; position (F, n) [rad] answered at read_at (F, n) [s], NaN where nothing was read.
@@ -136,18 +136,19 @@ def load_log(path: str | Path) -> PlayLog:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
-    lacking = [name for name in (*_SHAPES, "joint_names", "meta") if name not in arrays]
-    if lacking:
+    missing = [name for name in (*_SHAPES, "joint_names", "meta") if name not in arrays]
+    if missing:
         raise InputError(
-            f"{path} is no log of a play: it lacks {', '.join(lacking)}. Give the play.npz of a screwkin send"
+            f"{path} is no log of a play: {', '.join(missing)} missing. "
+            "Expected the play.npz of a screwkin send"
         )
     names = tuple(map(str, np.atleast_1d(arrays["joint_names"])))
     sizes = {"F": len(np.atleast_1d(arrays["time"])), "n": len(names)}
     for name, axes in _SHAPES.items():
         shape = tuple(sizes[axis] for axis in axes)
         if arrays[name].shape != shape or arrays[name].dtype != np.float64:
-            found = f"{arrays[name].dtype} {arrays[name].shape}"
-            raise InputError(f"{path}: {name} is {found}, expected float64 {shape}; the log is damaged")
+            kind = f"{arrays[name].dtype} {arrays[name].shape}"
+            raise InputError(f"{path}: {name} is {kind}, expected float64 {shape}; the log is damaged")
     try:
         meta = json.loads(str(arrays["meta"]))
     except ValueError:

@@ -5,9 +5,13 @@ The layout of the bytes is in ``protocol1`` and ``protocol2``; both hold the sam
     pack(packet) -> bytes                        a packet as bytes
     status(id, error, data) -> bytes             a servo's answer as bytes
     parse(buffer, ended) -> (packets, rest)      the sound packets of a stream, and what may become one
-    command_for(packet, id) -> Command or None   what a packet asks of the servo of that id
+    command_for(packet, id) -> Request or None   what a packet asks of the servo of that id
+    errors(byte) -> names                        what an answer's error byte says
+    error_byte(outcome, alarms) -> int           the error byte of an answer
+    FACTS                                        sizes, places, and how its servos behave
 
-They share nothing with the makers' driver, so that each tests the other.
+A further protocol is one such file and its row in ``protocols``. They share nothing with the makers' driver,
+so that each tests the other.
 """
 
 from __future__ import annotations
@@ -23,9 +27,12 @@ Kind = Literal[
     "ping", "read", "write", "register", "action", "factory reset", "reboot", "unknown", "malformed"
 ]
 
+RequestOutcome = Literal["done", "angle", "limit", "range", "access", "instruction"]
+"""What became of a request: carried out, or why not."""
+
 
 class Instruction(IntEnum):
-    """The instruction byte; ``STATUS`` only on protocol 2.0, where answers bear it."""
+    """The instruction byte; ``STATUS`` only on protocol 2.0, where answers carry it."""
 
     PING = 0x01
     READ = 0x02
@@ -51,10 +58,44 @@ class Packet:
 
 
 @dataclass(frozen=True)
-class Command:
+class ProtocolFacts:
+    """What distinguishes a protocol besides the bytes of its packets.
+
+    Attributes:
+        number: its name, 1.0 or 2.0.
+        id_at, length_at, error_at: places in an answer: of the id, of the length, of the error byte.
+        length_width: bytes of the length.
+        counted: bytes that the length counts besides the data.
+        read_size, answer_size, sync_size: bytes of a request to read, and of an answer and a sync write
+            without data.
+        driver_options: what the makers' driver wants to know when it receives a packet.
+        goal_switches_torque_on: writing a goal does so.
+        ping_names_model: the answer to a ping holds the model number.
+        partial_reset: a factory reset may spare the lasting registers.
+        locked_while_stiff: the lasting registers cannot be written while torque is on.
+    """
+
+    number: float
+    id_at: int
+    length_at: int
+    error_at: int
+    length_width: int
+    counted: int
+    read_size: int
+    answer_size: int
+    sync_size: int
+    driver_options: tuple[bool, ...]
+    goal_switches_torque_on: bool
+    ping_names_model: bool
+    partial_reset: bool
+    locked_while_stiff: bool
+
+
+@dataclass(frozen=True)
+class Request:
     """What one servo is asked: ``length`` bytes to read, ``data`` to write, at ``address``.
 
-    ``answers`` says whether an answer may be given at all, whatever the servo's status level; ``after`` names
+    ``answers`` says whether it may be answered at all, whatever the servo's status level; ``after`` names
     the servos whose answers come before its own.
     """
 
@@ -83,7 +124,7 @@ def sound_packets(
         buffer: what has arrived, the rest of last time before it.
         ended: no more bytes are coming.
         header: what every packet begins with.
-        length: bytes of the packet whose header stands at an index of the data, as far as they tell it; 0 if
+        length: bytes of the packet whose header stands at an index of the data, as far as they say; 0 if
             none can begin there.
         opened: the packet that so many bytes are, and how many of them it uses up; None if it is false.
     """
@@ -96,36 +137,36 @@ def sound_packets(
         if i + whole > len(data):
             if not ended:
                 return packets, data[i:]
-        elif whole and (found := opened(data[i : i + whole])):
-            packets.append(found[0])
-            end = i + found[1]
+        elif whole and (sound := opened(data[i : i + whole])):
+            packets.append(sound[0])
+            end = i + sound[1]
     begun = (header[:n] for n in range(len(header) - 1, 0, -1) if data.endswith(header[:n], end))
     return packets, b"" if ended else next(begun, b"")
 
 
-def simple_command(packet: Packet, address_width: int) -> Command:
+def simple_command(packet: Packet, address_width: int) -> Request:
     """What an instruction to one servo, or to all alike, asks: all but the sync and bulk ones."""
     answers, params = packet.id != BROADCAST, packet.params
     address = int.from_bytes(params[:address_width], "little")
     match packet.instruction:
         case Instruction.PING:
-            return Command("ping", answers=answers)
+            return Request("ping", answers=answers)
         case Instruction.READ if len(params) == 2 * address_width:
             length = int.from_bytes(params[address_width:], "little")
-            return Command("read", address, length, answers=answers)
+            return Request("read", address, length, answers=answers)
         case Instruction.WRITE if len(params) > address_width:
-            return Command("write", address, data=params[address_width:], answers=answers)
+            return Request("write", address, data=params[address_width:], answers=answers)
         case Instruction.REG_WRITE if len(params) > address_width:
-            return Command("register", address, data=params[address_width:], answers=answers)
+            return Request("register", address, data=params[address_width:], answers=answers)
         case Instruction.ACTION:
-            return Command("action", answers=answers)
+            return Request("action", answers=answers)
         case Instruction.FACTORY_RESET:
-            return Command("factory reset", data=params, answers=answers)
+            return Request("factory reset", data=params, answers=answers)
         case Instruction.REBOOT if address_width == 2:
-            return Command("reboot", answers=answers)
+            return Request("reboot", answers=answers)
         case Instruction.READ | Instruction.WRITE | Instruction.REG_WRITE:
-            return Command("malformed", answers=answers)
-    return Command("unknown", answers=answers)
+            return Request("malformed", answers=answers)
+    return Request("unknown", answers=answers)
 
 
 def rows(params: bytes, size: int) -> list[bytes] | None:
@@ -135,15 +176,15 @@ def rows(params: bytes, size: int) -> list[bytes] | None:
     return [params[i : i + size] for i in range(0, len(params), size)]
 
 
-def sync_write_command(head: bytes, body: bytes, id: int, width: int) -> Command | None:
+def sync_write_command(head: bytes, body: bytes, id: int, width: int) -> Request | None:
     """What a sync write asks of a servo: ``head`` holds address and length, ``body`` rows of id and data."""
     address, length = int.from_bytes(head[:width], "little"), int.from_bytes(head[width:], "little")
     for row in rows(body, length + 1) or ():
         if row[0] == id and length:
-            return Command("write", address, data=row[1:], answers=False)
+            return Request("write", address, data=row[1:], answers=False)
     return None
 
 
-def turn(ids: Sequence[int], id: int) -> tuple[int, ...] | None:
+def ids_before(ids: Sequence[int], id: int) -> tuple[int, ...] | None:
     """The ids before ``id``; None if it is not among them."""
     return tuple(ids[: ids.index(id)]) if id in ids else None

@@ -26,7 +26,7 @@ from screwkin.servo.line import BusError, LineLostError, Reply
 from screwkin.servo.log import Log
 from screwkin.servo.profiles import Profile, physical
 from screwkin.servo.servo_map import ServoMap
-from screwkin.servo.watch import FaultFound, ServoFault, Thresholds, Watch
+from screwkin.servo.watch import PlayStopped, ServoFault, Thresholds, Watch
 from screwkin.trajectory import Trajectory
 
 State = Literal["hold", "limp"]
@@ -39,7 +39,7 @@ class PlaySettings:
 
     rate [Hz]; torque: share of what the limits allow; start_speed [rad/s] of the soft start; far [rad]: a
     greater distance from the measured pose to the first sample is refused; settle [s] at rest after the last
-    sample; stop [s]: time to come to rest when told to; tolerance [s]: a frame sent later counts as late;
+    sample; stop [s]: time to come to rest when asked to; tolerance [s]: a frame sent later counts as late;
     on_fault, at_end: what the servos are left in.
     """
 
@@ -65,8 +65,8 @@ class Frames:
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
-    """What a play came to; ``final`` tells the state in which the servos were left."""
+class PlayOutcome:
+    """The result of a play; ``final`` is the state in which the servos were left."""
 
     frames: int
     late_frames: int
@@ -94,7 +94,7 @@ def frames_of(bounds: Bounds, trajectory: Trajectory, rate: float = 50.0) -> Fra
         InputError: no such rate. SafetyError: a frame, or the way from one to the next, is beyond the limits.
     """
     if not (math.isfinite(rate) and 1.0 <= rate <= 1000.0):
-        raise InputError(f"rate {rate!r} Hz is none to play at; give one from 1 to 1000, such as 50")
+        raise InputError(f"rate {rate!r} Hz is not a rate to play at; expected 1 to 1000, such as 50")
     count = math.ceil(trajectory.duration * rate - 1e-9) + 1
     time = np.minimum(np.arange(count) / rate, trajectory.duration)
     q = trajectory.sampled(trajectory.time[0] + time)[0]
@@ -117,7 +117,7 @@ class Player:
         robot: whose limits hold.
         settings: how to play.
         stop: asked in every frame whether to come to rest early.
-        progress: told the share of the trajectory that was played.
+        progress: called with the share of the trajectory that was played.
     """
 
     def __init__(
@@ -141,8 +141,8 @@ class Player:
         self._queue = deque(range(len(self.bounds.ids)))
         self._blocks = [block_of(profile) for profile in self.bounds.profiles]
 
-    def play(self, trajectory: Trajectory) -> Outcome:
-        """Play the trajectory, and leave the servos as the settings tell.
+    def play(self, trajectory: Trajectory) -> PlayOutcome:
+        """Play the trajectory, and leave the servos as the settings say.
 
         Raises:
             SafetyError: beyond limits, or the servos are not in a state to begin; nothing has moved.
@@ -164,8 +164,8 @@ class Player:
             self._tune(patience)
             self._run(frames, pose)
             state, finished = self.settings.at_end, True
-        except FaultFound as found:
-            fault = found.fault
+        except PlayStopped as stopped:
+            fault = stopped.fault
         except LineLostError as error:
             fault = ServoFault("line", "", -1, self._time(), str(error))
         except SafetyError as error:
@@ -177,7 +177,7 @@ class Player:
             final = leave(self.gate, self.bus, state, finished)
             self.bus.retries, self.bus.patience = retries, patience
         faults = (fault,) if fault else ()
-        return Outcome(self._frames, self._late, self.watch.max_tracking_error, faults, final, self.log)
+        return PlayOutcome(self._frames, self._late, self.watch.max_tracking_error, faults, final, self.log)
 
     def ready_pose(self, first: Array) -> Array:
         """The measured pose (n,) [rad], if the servos may begin.
@@ -203,8 +203,8 @@ class Player:
                 raise SafetyError(f"the servos cannot be asked, at {name} (servo {id}): {error}") from None
             except BusError as error:
                 reasons.append(f"{name}: {error}")
-            except FaultFound as found:
-                reasons.append(f"{name} (servo {id}): {found.fault.message}")
+            except PlayStopped as stopped:
+                reasons.append(f"{name} (servo {id}): {stopped.fault.message}")
         away = np.abs(pose - first)
         reasons += [
             f"{self.bounds.names[k]} (servo {self.bounds.ids[k]}) stands {away[k]:.2f} rad from its first "
@@ -277,7 +277,7 @@ class Player:
         low = np.floor(np.maximum(at, 0.0)).astype(int)
         share = (np.maximum(at, 0.0) - low)[:, None]
         self._stream(q[low] * (1 - share) + q[np.minimum(low + 1, len(q) - 1)] * share, None)
-        raise FaultFound(ServoFault("interrupted", "", -1, self._time(), "stopped by the user"))
+        raise PlayStopped(ServoFault("interrupted", "", -1, self._time(), "stopped by the user"))
 
     def _read(self, goal: Array) -> None:
         """Read servos in turn until the next frame is near; who did not answer is first in the next frame."""
@@ -337,7 +337,7 @@ class Player:
         return self.bus.read(self.bounds.ids[k], start, length)
 
     def _values(self, k: int, reply: Reply) -> dict[str, float]:
-        """What a servo's block tells, in SI; the torque registers as they are."""
+        """The values of a servo's block in SI; the torque registers as they are."""
         profile = self.bounds.profiles[k]
         start, _, names = self._blocks[k]
         raw = {name: _register(profile, name, reply.data, start) for name in names}
@@ -365,7 +365,7 @@ def _register(profile: Profile, name: str, data: bytes, start: int) -> int:
     return int.from_bytes(data[register.address - start : register.end - start], "little")
 
 
-def describe(outcome: Outcome, ids: Sequence[int]) -> str:
+def describe(outcome: PlayOutcome, ids: Sequence[int]) -> str:
     """One sentence about how a play ended."""
     how = "; ".join(map(str, outcome.faults)) or "played to its end"
     return f"{how}. {outcome.final.sentence(len(ids))}"

@@ -34,7 +34,7 @@ _UNITS: Mapping[str, float] = {"0.1V": 0.1, "degC": 1.0, "2us": 2e-6, "ms": 1e-3
 class Register:
     """A place of the register table: ``width`` bytes at ``address``, the low byte first.
 
-    ``low`` and ``high`` bound the value (after its sign is decoded); ``sign`` tells how negative values are
+    ``low`` and ``high`` bound the value (after its sign is decoded); ``sign`` says how negative values are
     written: not at all, by bit 10, or as two's complement.
     """
 
@@ -58,7 +58,7 @@ class Register:
 class Profile:
     """A servo model. Angles are measured from the servo's centre, positive towards greater ticks.
 
-    ``number`` is what its ``model_number`` register holds, 0 where nobody has told.
+    ``number`` is what its ``model_number`` register holds, 0 where it is not published.
 
     ``range_deg / ticks`` is one tick; the greatest tick is ``ticks - 1``. Speed unit in rad/s, load unit as a
     share of the greatest torque, no-load speed in rad/s, stall torque in N m, nominal voltage in V.

@@ -17,26 +17,66 @@ Source: the maker's description of protocol 2.0.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+from screwkin.servo.line import ErrorBit
 from screwkin.servo.packets import (
     BROADCAST,
-    Command,
     Instruction,
     Packet,
+    ProtocolFacts,
+    Request,
+    RequestOutcome,
+    ids_before,
     rows,
     simple_command,
     sound_packets,
     sync_write_command,
-    turn,
 )
 
 MOST = 1024
 """Bytes that ``len`` may count: servos have no room for more, so a greater length is noise."""
+
+FACTS = ProtocolFacts(
+    number=2.0,
+    id_at=4,
+    length_at=5,
+    error_at=8,
+    length_width=2,
+    counted=4,
+    read_size=14,
+    answer_size=11,
+    sync_size=14,
+    driver_options=(False,),
+    goal_switches_torque_on=False,
+    ping_names_model=True,
+    partial_reset=True,
+    locked_while_stiff=True,
+)
 
 _HEADER = b"\xff\xff\xfd\x00"
 _OVERHEAD = 7  # header, id, len
 _LEAST = 3  # instruction, crc
 _PATTERN, _STUFFED = b"\xff\xff\xfd", b"\xff\xff\xfd\xfd"
 _POLYNOMIAL = 0x8005
+_ALERT = 0x80  # of the hardware
+_NUMBERS: Mapping[int, ErrorBit] = {
+    1: "instruction",
+    2: "instruction",
+    3: "checksum",
+    4: "range",
+    5: "range",
+    6: "range",
+    7: "access",
+}
+_OUTCOMES: Mapping[RequestOutcome, int] = {
+    "done": 0,
+    "angle": 6,
+    "limit": 6,
+    "range": 4,
+    "access": 7,
+    "instruction": 2,
+}
 
 
 def _crc_row(byte: int) -> int:
@@ -60,13 +100,25 @@ def crc16(data: bytes) -> int:
 def pack(packet: Packet) -> bytes:
     """A packet as bytes."""
     body = (bytes((packet.instruction,)) + packet.params).replace(_PATTERN, _STUFFED)
-    told = _HEADER + bytes((packet.id,)) + (len(body) + 2).to_bytes(2, "little") + body
-    return told + crc16(told).to_bytes(2, "little")
+    checked = _HEADER + bytes((packet.id,)) + (len(body) + 2).to_bytes(2, "little") + body
+    return checked + crc16(checked).to_bytes(2, "little")
 
 
 def status(id: int, error: int, data: bytes = b"") -> bytes:
     """A servo's answer as bytes."""
     return pack(Packet(id, Instruction.STATUS, bytes((error,)) + data))
+
+
+def errors(byte: int) -> frozenset[ErrorBit]:
+    """What an answer's error byte says."""
+    number = byte & ~_ALERT
+    names: frozenset[ErrorBit] = frozenset({_NUMBERS[number]} if number in _NUMBERS else ())
+    return names | {"hardware"} if byte & _ALERT else names
+
+
+def error_byte(outcome: RequestOutcome, alarms: int) -> int:
+    """The error byte of an answer: what became of the request, and whether the servo has an alarm."""
+    return (_ALERT if alarms else 0) | _OUTCOMES[outcome]
 
 
 def parse(buffer: bytes, ended: bool = False) -> tuple[list[Packet], bytes]:
@@ -81,8 +133,8 @@ def _length(data: bytes, i: int) -> int:
     """Bytes of the packet at an index; 0 if none can begin there."""
     if data[i + 4 : i + 5] == b"\xff":
         return 0
-    told = int.from_bytes(data[i + 5 : i + 7], "little") if i + _OVERHEAD <= len(data) else _LEAST
-    return _OVERHEAD + told if _LEAST <= told <= MOST else 0
+    length = int.from_bytes(data[i + 5 : i + 7], "little") if i + _OVERHEAD <= len(data) else _LEAST
+    return _OVERHEAD + length if _LEAST <= length <= MOST else 0
 
 
 def _opened(data: bytes) -> tuple[Packet, int] | None:
@@ -93,7 +145,7 @@ def _opened(data: bytes) -> tuple[Packet, int] | None:
     return Packet(data[4], body[0], body[1:]), len(data)
 
 
-def command_for(packet: Packet, id: int) -> Command | None:
+def command_for(packet: Packet, id: int) -> Request | None:
     """What a packet asks of the servo of that id; None if it is not concerned."""
     params, everyone = packet.params, packet.id == BROADCAST
     match packet.instruction:
@@ -102,29 +154,29 @@ def command_for(packet: Packet, id: int) -> Command | None:
         case Instruction.SYNC_WRITE:
             return sync_write_command(params[:4], params[4:], id, width=2) if everyone else None
         case Instruction.SYNC_READ:
-            before = turn(list(params[4:]), id)
+            before = ids_before(list(params[4:]), id)
             if before is None or not everyone:
                 return None
-            return Command("read", _number(params[:2]), _number(params[2:4]), after=before)
+            return Request("read", _number(params[:2]), _number(params[2:4]), after=before)
         case Instruction.BULK_READ:
             wanted = {row[0]: row for row in rows(params, 5) or ()}
-            before = turn(list(wanted), id)
+            before = ids_before(list(wanted), id)
             if before is None or not everyone:
                 return None
-            return Command("read", _number(wanted[id][1:3]), _number(wanted[id][3:5]), after=before)
+            return Request("read", _number(wanted[id][1:3]), _number(wanted[id][3:5]), after=before)
         case Instruction.BULK_WRITE:
             return _bulk_write(params, id) if everyone else None
         case Instruction.PING if everyone:
-            return Command("ping", after=tuple(range(id)))
+            return Request("ping", after=tuple(range(id)))
     return simple_command(packet, address_width=2) if packet.id in (id, BROADCAST) else None
 
 
-def _bulk_write(params: bytes, id: int) -> Command | None:
+def _bulk_write(params: bytes, id: int) -> Request | None:
     """Rows of id, address, length and as many bytes of data."""
     while len(params) >= 5:
         length = _number(params[3:5])
         if params[0] == id and 0 < length <= len(params) - 5:
-            return Command("write", _number(params[1:3]), data=params[5 : 5 + length], answers=False)
+            return Request("write", _number(params[1:3]), data=params[5 : 5 + length], answers=False)
         params = params[5 + length :]
     return None
 

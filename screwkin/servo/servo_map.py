@@ -61,13 +61,13 @@ class ServoJoint:
 
     @property
     def lower(self) -> float:
-        """The least joint angle that the servo can be told [rad]."""
+        """The least joint angle that can be commanded [rad]."""
         ends = (self.profile.lower, self.profile.upper)
         return min(self.direction * (end - self.zero) for end in ends)
 
     @property
     def upper(self) -> float:
-        """The greatest joint angle that the servo can be told [rad]."""
+        """The greatest joint angle that can be commanded [rad]."""
         ends = (self.profile.lower, self.profile.upper)
         return max(self.direction * (end - self.zero) for end in ends)
 
@@ -93,7 +93,7 @@ class ServoMap:
             try:
                 profiles[joint] = _profile_of(robot.servos, joint)
             except UnknownNameError:
-                continue  # told among the faults
+                continue  # listed among the faults
         if len(protocols := {profile.protocol for profile in profiles.values()}) > 1:
             fix = "Servos of one bus speak one protocol: change the models, or their firmware"
             faults.append(Fault("[servos]", "models", f"speak protocols {sorted(protocols)}", fix))
@@ -130,7 +130,7 @@ class ServoMap:
         raise UnknownNameError("joint", name, tuple(servo.joint for servo in self.joints))
 
     def by_id(self, servo_id: int) -> ServoJoint:
-        """The servo that bears an id.
+        """The servo with an id.
 
         Raises:
             UnknownNameError: none does.
@@ -158,13 +158,13 @@ def _faults(names: tuple[str, ...], servos: Mapping[str, Any]) -> Iterator[Fault
         if key not in KEYS:
             yield Fault("[servos]", key, "is unknown", f"Known are {', '.join(KEYS)}")
     models = {key: servos.get(key, default) for key, default in (("models", {}), ("model", None))}
-    told = [("model", models["model"])] if models["model"] is not None or not models["models"] else []
+    named = [("model", models["model"])] if models["model"] is not None or not models["models"] else []
     if isinstance(models["models"], Mapping):
-        told += [(f"models.{joint}", model) for joint, model in models["models"].items()]
-    for key, model in told:
+        named += [(f"models.{joint}", model) for joint, model in models["models"].items()]
+    for key, model in named:
         if not isinstance(model, str) or not _known(model):
-            found = "is missing" if model is None else f"{model!r} is unknown"
-            yield Fault("[servos]", key, found, f"Known are {', '.join(profile_models())}")
+            what = "is missing" if model is None else f"{model!r} is unknown"
+            yield Fault("[servos]", key, what, f"Known are {', '.join(profile_models())}")
     for key in ("models", "ids", "direction", "zero"):
         table = servos.get(key, {})
         if not isinstance(table, Mapping):
@@ -191,8 +191,8 @@ def _id_faults(names: tuple[str, ...], ids: Mapping[str, Any]) -> Iterator[Fault
             bearers.setdefault(number, []).append(joint)
     for number, joints in bearers.items():
         if len(joints) > 1:
-            found = f"{number} is given to {', '.join(joints)}"
-            yield Fault("[servos]", "ids", found, "Give every servo an id of its own")
+            what = f"{number} is given to {', '.join(joints)}"
+            yield Fault("[servos]", "ids", what, "Give every servo an id of its own")
     if missing := [name for name in names if name not in ids]:
         yield Fault("[servos]", "ids", f"has none for {', '.join(missing)}", "Give every joint an id")
 
@@ -215,8 +215,8 @@ def _line_faults(servos: Mapping[str, Any], profiles: Any) -> Iterator[Fault]:
     kinds = {profile.model: profile for profile in profiles}.values()
     for profile in kinds:
         if protocol is not None and protocol != profile.protocol:
-            found = f"is {protocol!r}, but a {profile.model} speaks {profile.protocol}"
-            yield Fault("[servos]", "protocol", found, "Leave it out, or name the model with that firmware")
+            what = f"is {protocol!r}, but a {profile.model} speaks {profile.protocol}"
+            yield Fault("[servos]", "protocol", what, "Leave it out, or name the model with that firmware")
     if not (isinstance(baud, int) and not isinstance(baud, bool) and baud > 0):
         yield Fault("[servos]", "baud", f"is {baud!r}", "Write an integer, such as 1000000")
         return

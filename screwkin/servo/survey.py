@@ -10,15 +10,16 @@ from screwkin.servo.budget import block_of
 from screwkin.servo.bus import Bus
 from screwkin.servo.line import BusError, DamagedError, LineLostError
 from screwkin.servo.profiles import Profile, load_profile, physical, profile_models
+from screwkin.servo.protocols import CODECS
 from screwkin.servo.servo_map import ServoMap
 
 IDS = range(253)
 BAUDS = (1_000_000, 57_600, 115_200, 500_000, 200_000, 250_000, 400_000, 19_200, 9_600, 2_000_000, 3_000_000)
-PROTOCOLS = (1.0, 2.0)
+PROTOCOLS = tuple(CODECS)
 
 
 @dataclass(frozen=True)
-class Found:
+class AnsweringServo:
     """A servo that answered: model is its number, -1 where only damaged packets came."""
 
     id: int
@@ -35,15 +36,15 @@ class Found:
 
 def scan(
     bus: Bus, ids: Iterable[int] = IDS, progress: Callable[[int], None] = lambda id: None
-) -> list[Found]:
+) -> list[AnsweringServo]:
     """Every servo that answers at the bus's rate and protocol.
 
-    Where two share an id their answers spoil each other; that is told as model -1.
+    Where two share an id their answers spoil each other; that is reported as model -1.
 
     Raises:
         LineLostError: the port is gone.
     """
-    found = []
+    answering = []
     for id in ids:
         progress(id)
         try:
@@ -55,8 +56,8 @@ def scan(
             number = -1
         except BusError:
             continue
-        found.append(Found(id, number, bus.protocol, bus.baud))
-    return found
+        answering.append(AnsweringServo(id, number, bus.protocol, bus.baud))
+    return answering
 
 
 def _spoiled(bus: Bus, id: int, number: int) -> None:
@@ -67,15 +68,15 @@ def _spoiled(bus: Bus, id: int, number: int) -> None:
             bus.read(id, *block_of(profile)[:2])
 
 
-def differences(found: Sequence[Found], servos: ServoMap) -> list[str]:
-    """How the servos found differ from the robot's table."""
-    return list(_differences({servo.id: servo for servo in found}, servos))
+def servo_differences(answering: Sequence[AnsweringServo], servos: ServoMap) -> list[str]:
+    """How the servos that answer differ from the robot's table."""
+    return list(_differences({servo.id: servo for servo in answering}, servos))
 
 
-def _differences(found: dict[int, Found], servos: ServoMap) -> Iterator[str]:
+def _differences(answering: dict[int, AnsweringServo], servos: ServoMap) -> Iterator[str]:
     for joint in servos.joints:
         who = f"{joint.joint} (servo {joint.id})"
-        servo = found.get(joint.id)
+        servo = answering.get(joint.id)
         if servo is None:
             yield f"{who} is missing"
             continue
@@ -87,7 +88,7 @@ def _differences(found: dict[int, Found], servos: ServoMap) -> Iterator[str]:
             yield f"{who} speaks protocol {servo.protocol}, the table has {servos.protocol}"
         if servo.baud != servos.baud:
             yield f"{who} is set to {servo.baud} baud, the table has {servos.baud}"
-    for id, servo in sorted(found.items()):
+    for id, servo in sorted(answering.items()):
         if id not in servos.ids:
             yield f"servo {id} ({servo.name}) belongs to no joint of {servos.robot}"
 
@@ -128,5 +129,5 @@ def measured_angles(bus: Bus, servos: ServoMap) -> dict[str, float]:
             continue
         angles[joint.joint] = physical(joint.profile, "present_position", raw)
     if silent:
-        raise InputError(f"no answer from {', '.join(silent)}; screwkin bus scan tells who is there")
+        raise InputError(f"no answer from {', '.join(silent)}; screwkin bus scan lists those that do")
     return angles

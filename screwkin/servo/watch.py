@@ -47,8 +47,8 @@ class ServoFault:
         return asdict(self)
 
 
-class FaultFound(Exception):
-    """Stops the frames; ``fault`` tells why."""
+class PlayStopped(Exception):
+    """Stops the frames; ``fault`` says why."""
 
     def __init__(self, fault: ServoFault) -> None:
         self.fault = fault
@@ -92,7 +92,7 @@ class Watch:
         """A servo has answered.
 
         Raises:
-            FaultFound: it complains, or is too hot, or its voltage is out of range.
+            PlayStopped: it complains, or is too hot, or its voltage is out of range.
         """
         self._lost[k], self._silence = 0, 0
         limit, nominal = self.thresholds, self.bounds.profiles[k].voltage
@@ -107,10 +107,10 @@ class Watch:
             self._fault("voltage", k, time, f"{values['voltage']:.1f} V, outside {low:.1f} to {high:.1f} V")
 
     def tracked(self, k: int, values: Mapping[str, float], command: float, time: float) -> None:
-        """A servo that was given a command has answered.
+        """A servo that follows commands has answered.
 
         Raises:
-            FaultFound: it is too far off, or loaded too much, for too long; or its torque was changed.
+            PlayStopped: it is too far off, or loaded too much, for too long; or its torque was changed.
         """
         limit = self.thresholds
         error = abs(values["position"] - command)
@@ -128,20 +128,22 @@ class Watch:
             -1.0,
             float(self.torque_limits[k]),
         ):
-            told = f"its torque limit is {values['torque_limit']:.0f}, and was set to {self.torque_limits[k]}"
-            self._fault("torque", k, time, f"{told}: it was reset, or shut itself down")
+            limits = (
+                f"its torque limit is {values['torque_limit']:.0f}, and was set to {self.torque_limits[k]}"
+            )
+            self._fault("torque", k, time, f"{limits}: it was reset, or shut itself down")
 
     def lost(self, k: int, time: float) -> None:
         """A reply is missing.
 
         Raises:
-            FaultFound: too many in a row.
+            PlayStopped: too many in a row.
         """
         self._lost[k] += 1
         self._silence += 1
         if self._silence >= self.thresholds.silence:
             text = f"{self._silence} replies in a row are missing, of servo {self.bounds.ids[k]} last"
-            raise FaultFound(ServoFault("lost", self.bounds.names[k], self.bounds.ids[k], time, text))
+            raise PlayStopped(ServoFault("lost", self.bounds.names[k], self.bounds.ids[k], time, text))
         if self._lost[k] >= self.thresholds.lost:
             self._fault("lost", k, time, f"{self._lost[k]} replies in a row are missing")
 
@@ -149,11 +151,11 @@ class Watch:
         """A frame was sent late.
 
         Raises:
-            FaultFound: by too much.
+            PlayStopped: by too much.
         """
         if by > self.thresholds.late:
             text = f"a frame was sent {by:.3f} s late, at most {self.thresholds.late:.3f}"
-            raise FaultFound(ServoFault("late", "", -1, time, text))
+            raise PlayStopped(ServoFault("late", "", -1, time, text))
 
     def _for_long(self, since: Any, k: int, bad: bool, time: float, allowed: float) -> bool:
         if not bad:
@@ -163,4 +165,4 @@ class Watch:
         return bool(time - since[k] >= allowed)
 
     def _fault(self, kind: FaultKind, k: int, time: float, message: str) -> None:
-        raise FaultFound(ServoFault(kind, self.bounds.names[k], self.bounds.ids[k], time, message))
+        raise PlayStopped(ServoFault(kind, self.bounds.names[k], self.bounds.ids[k], time, message))

@@ -11,7 +11,7 @@ from screwkin.model.state import State
 
 @dataclass(frozen=True, eq=False)
 class Command:
-    """What the joints are told for one step: q (n,) at its start, qd (n,) through it [rad or m, per s].
+    """Commands to the joints for one step: q (n,) at its start, qd (n,) through it [rad or m, per s].
 
     T_world_base (4, 4) is where the plan sees the base; a backend with physics takes no notice of it.
     """

@@ -20,12 +20,12 @@ from screwkin.sim.backend import Command, Observation
 from screwkin.sim.pybullet import Physics, PyBulletBackend
 
 STEP = 5e-4
-"""Duration of a step unless told otherwise [s]."""
+"""Duration of a step by default [s]."""
 
 
 @dataclass(frozen=True)
 class Compliance:
-    """How the joints yield in a simulation.
+    """Springs and dampers of the joints in a simulation.
 
     stiffness: see ``joint_stiffness``; damping: [N m s/rad]; rotor_inertia: least inertia of a link about
     each axis [kg m^2].
@@ -61,11 +61,11 @@ class CompliantBackend(PyBulletBackend):
             InputError: see ``PyBulletBackend`` and ``joint_stiffness``; or the step is too long for springs
                 so stiff on links so light.
         """
-        yields = compliance or Compliance()
+        springs = compliance or Compliance()
         physics = physics or Physics(dt=STEP)
-        self._k, self._d = joint_stiffness(robot, yields.stiffness), yields.damping
-        _check_step(float(self._k.max()), yields, physics.dt)
-        super().__init__(robot.with_inertia_floor(inertia=yields.rotor_inertia), physics, gui)
+        self._k, self._d = joint_stiffness(robot, springs.stiffness), springs.damping
+        _check_step(float(self._k.max()), springs, physics.dt)
+        super().__init__(robot.with_inertia_floor(inertia=springs.rotor_inertia), physics, gui)
         self._limit = np.array(self._efforts)
         self._torque = np.zeros_like(self._k)
 
@@ -88,15 +88,15 @@ class CompliantBackend(PyBulletBackend):
         return replace(super().observe(), torque=self._torque)
 
 
-def _check_step(k: float, yields: Compliance, dt: float) -> None:
+def _check_step(k: float, springs: Compliance, dt: float) -> None:
     """Refuse a step beyond which the lightest link on the stiffest spring would swing up by itself.
 
     A torque held for a step is stable on an inertia I while k dt^2 + 2 d dt < 4 I (semi-implicit Euler).
     """
-    inertia = yields.rotor_inertia
-    if k * dt**2 + 2 * yields.damping * dt >= 4 * inertia:
-        longest = (np.sqrt(yields.damping**2 + 4 * k * inertia) - yields.damping) / k
+    inertia = springs.rotor_inertia
+    if k * dt**2 + 2 * springs.damping * dt >= 4 * inertia:
+        longest = (np.sqrt(springs.damping**2 + 4 * k * inertia) - springs.damping) / k
         raise InputError(
-            f"a step of {1e3 * dt:g} ms is too long for joints of {k:g} N m/rad and {yields.damping:g} "
+            f"a step of {1e3 * dt:g} ms is too long for joints of {k:g} N m/rad and {springs.damping:g} "
             f"N m s/rad on links of {inertia:g} kg m^2; take less than {1e3 * longest:.3g} ms"
         )

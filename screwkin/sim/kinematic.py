@@ -1,4 +1,4 @@
-"""A robot that does exactly what it is told: no masses, no contacts. It serves tests and previews."""
+"""A robot that follows its commands exactly: no masses, no contacts. It serves tests and previews."""
 
 from __future__ import annotations
 
@@ -60,4 +60,4 @@ class KinematicBackend:
         )
 
     def close(self) -> None:
-        """Nothing to give back."""
+        """Nothing to release."""

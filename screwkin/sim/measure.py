@@ -18,7 +18,7 @@ WINDOW = 0.05
 
 @dataclass(frozen=True, eq=False)
 class ZmpRecord:
-    """ZMP measured and planned, averaged over the same windows; rows (M,) are told at their middle.
+    """ZMP measured and planned, averaged over the same windows; rows (M,) are at their middle.
 
     time (M,) [s]; contact (M, 2) from contact forces, planned (M, 2), ankle (M, 2) from the ankle sensors
     [m]. A row is NaN where nothing presses on the floor.
@@ -51,18 +51,18 @@ def zmp_record(run: Run, trajectory: Trajectory, window: float = WINDOW) -> ZmpR
     """
     count = max(1, round(window / run.dt))
     start = run.time - run.dt
-    kept = _before_fall(run)
-    if kept.sum() < count:
+    before = _before_fall(run)
+    if before.sum() < count:
         nothing = np.zeros((0, 2))
         return ZmpRecord(np.zeros(0), nothing, nothing, nothing)
-    planned = np.stack([np.interp(start[kept], trajectory.time, axis) for axis in trajectory.zmp.T], axis=1)
-    middle = _window_mean(start[kept], count)
+    planned = np.stack([np.interp(start[before], trajectory.time, axis) for axis in trajectory.zmp.T], axis=1)
+    middle = _window_mean(start[before], count)
     rows = (middle >= trajectory.time[0]) & (middle <= trajectory.time[-1])
     return ZmpRecord(
         time=middle[rows],
-        contact=_zmp(_window_mean(run.ground_wrench[kept], count))[rows],
+        contact=_zmp(_window_mean(run.ground_wrench[before], count))[rows],
         planned=_window_mean(planned, count)[rows],
-        ankle=_zmp(_window_mean(run.ankle_wrench[kept].sum(axis=1), count))[rows],
+        ankle=_zmp(_window_mean(run.ankle_wrench[before].sum(axis=1), count))[rows],
     )
 
 

@@ -273,7 +273,7 @@ class PyBulletBackend:
         """Ground wrench [m; f] about the world origin, from the sensor in the joint above a foot at rest.
 
         PyBullet reports the reaction on the child in the child's inertial frame, about its CoM, without the
-        share of the motor. The floor gives what is needed beside that and the foot's weight.
+        share of the motor. The floor supplies what is needed beside that and the foot's weight.
         """
         _, _, reaction, motor = self._p.getJointState(self._body, foot.index, **self._here)
         force, moment = np.array(reaction[:3]), np.array(reaction[3:])
@@ -339,14 +339,14 @@ def _imported_pybullet() -> Any:
 def _quiet() -> Iterator[None]:
     """Hold back what pybullet's C code prints on stderr when it is loaded."""
     sys.stderr.flush()
-    kept = os.dup(2)
+    original = os.dup(2)
     try:
         with open(os.devnull, "w") as nowhere:
             os.dup2(nowhere.fileno(), 2)
         yield
     finally:
-        os.dup2(kept, 2)
-        os.close(kept)
+        os.dup2(original, 2)
+        os.close(original)
 
 
 def _connected(p: Any, gui: bool) -> int:

@@ -1,4 +1,4 @@
-"""Pictures of a robot made of boxes on a tiled floor, drawn by NumPy and Pillow alone.
+"""Pictures of a robot of boxes on a tiled floor, drawn by NumPy and Pillow alone.
 
 No display, no graphics card, no simulator: the same function draws what a simulator saw and what a trajectory
 plans. Faces are filled front to back by depth, the shadow is the boxes' outline carried along the light onto
@@ -148,7 +148,7 @@ def _floor(camera: Camera, view: View, target: Array, away: float, boxes: Array)
 
 
 def _shadow(camera: Camera, view: View, boxes: Array) -> NDArray[np.float32]:
-    """Share (height, width) of the lamp's light that the boxes keep from the floor, softened at its edge."""
+    """Share (height, width) of the lamp's light that the boxes block, softened at the shadow's edge."""
     from PIL import Image, ImageDraw, ImageFilter
 
     mask = Image.new("L", (view.width, view.height))

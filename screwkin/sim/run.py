@@ -73,8 +73,8 @@ def simulate(
 ) -> Run:
     """Play a trajectory in a backend, which stays open.
 
-    Commands are the cubic Hermite interpolation of the samples: in every step the joints are told their
-    position at its start and their mean rate through it, so a perfect servo is exact at every step's end.
+    Commands are the cubic Hermite interpolation of the samples: for every step the position at its start and
+    the mean rate through it, so a perfect servo is exact at every step's end.
 
     Args:
         robot: of which the trajectory speaks, joints in table order.

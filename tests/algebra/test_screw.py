@@ -12,9 +12,11 @@ from hypothesis import strategies as st
 
 from screwkin.algebra import se3
 from screwkin.algebra.screws import (
+    AT_REST,
     INFINITE,
     Screw,
     Wrench,
+    advance,
     at,
     carry,
     displacement,
@@ -116,6 +118,18 @@ def test_displacements_about_one_screw_add_and_commute(screw, a, b):
 def test_no_displacement_is_the_identity_and_structural_zero_keeps_its_structure(screw):
     assert_close(displacement(screw, 0.0), np.eye(4), 1e-15)
     assert all(type(x) is int for x in se3.leaves(displacement(Screw(se3.Y, Vector(0, 0, 1)), 0)))
+
+
+@given(st.lists(st.tuples(screws, angles), min_size=1, max_size=5))
+def test_advancing_from_axis_to_axis_is_the_product_of_displacements(chain):
+    """Whatever axes are skew, parallel or aligned; as a pose, for points, axes and back."""
+    step, product = AT_REST, se3.IDENTITY
+    for screw, theta in chain:
+        assert_close(carry(step, screw).twist, carry(product, screw).twist, 1e-13)
+        step, product = advance(step, screw, theta), product @ displacement(screw, theta)
+    assert_close(step @ se3.IDENTITY, product, 1e-13)
+    assert_close(step.R, product.R, 1e-13)
+    assert_close(step.inverse @ se3.IDENTITY, product.inverse, 1e-13)
 
 
 def test_a_displacement_far_from_the_origin_loses_no_more_than_rounding():

@@ -65,7 +65,7 @@ def test_json_names_port_and_servos(cli):
 
 
 def test_a_pulled_cable_ends_it(cli):
-    called = cli("bus", "virtual", "bioloid", "--trouble", "pulled@0.1", "--seconds", 30)
+    called = cli("bus", "virtual", "bioloid", "--inject-fault", "pulled@0.1", "--seconds", 30)
     assert called.code == 0
     assert "0 packets" in called.err
 
@@ -73,14 +73,14 @@ def test_a_pulled_cable_ends_it(cli):
 @pytest.mark.parametrize(
     ("words", "part"),
     [
-        (["--trouble", "fire@1"], "unknown kind 'fire'; valid: deaf"),
-        (["--trouble", "late@x"], "KIND@FROM-TO:ID"),
-        (["--trouble", "late@3-2"], "0 <= FROM <= TO"),
+        (["--inject-fault", "fire@1"], "unknown kind 'fire'; valid: deaf"),
+        (["--inject-fault", "late@x"], "KIND@FROM-TO:ID"),
+        (["--inject-fault", "late@3-2"], "0 <= FROM <= TO"),
         (["--seconds", "nan"], "is no time"),
         (["--posture", "yoga"], "unknown posture 'yoga'; valid: zero, home"),
         (["--return-delay", "-1"], "servos have 0 to 0.000508 s"),
         (["--stiffness", "0"], "must be a positive number"),
-        (["--link", "/proc/none/here"], "cannot be made"),
+        (["--link", "/proc/none/here"], "cannot be created"),
     ],
 )
 def test_wrong_words_are_refused_before_a_port_is_opened(cli, words, part):
@@ -97,3 +97,10 @@ def test_a_robot_without_servos_is_told_what_to_write(cli, tmp_path):
     assert called.code == 2
     assert "[servos]: is missing. Write at least model and ids there" in called.err
     assert cli("bus").code == 2
+
+
+def test_the_former_name_of_inject_fault_still_works_and_is_not_advertised(cli):
+    assert cli("bus", "virtual", "bioloid", "--trouble", "pulled@0.1", "--seconds", 30).code == 0
+    shown = cli("bus", "virtual", "--help").out
+    assert "--inject-fault" in shown
+    assert "--trouble" not in shown

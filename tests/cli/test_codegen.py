@@ -44,7 +44,7 @@ def test_the_driver_notices_a_wrong_sign(cli, tmp_path):
     assert cli("codegen", "poppy12", "--what", "com", "-o", str(tmp_path)).code == 0
     source = tmp_path / "poppy12.c"
     text = source.read_text()
-    at = text.index("scatter(com + 0, 3, ") + len("scatter(com + 0, 3, ")
+    at = text.index("scatter(center_of_mass + 0, 3, ") + len("scatter(center_of_mass + 0, 3, ")
     source.write_text(text[:at] + "-" + text[at:])
     files = [str(tmp_path / name) for name in ("test_poppy12.c", "poppy12.c")]
     subprocess.run([native.compiler(), *WARNINGS, "-o", str(tmp_path / "driver"), *files, "-lm"], check=True)

@@ -76,7 +76,7 @@ def test_the_text_tells_the_same_numbers(cli):
         (["bioloid25"], "unknown robot 'bioloid25'; valid: bioloid"),
         (["./absent.toml"], "absent.toml"),
         (["bioloid", "--posture", "dancing"], "unknown posture 'dancing'; valid: "),
-        (["bioloid", "--at", "1,2"], "--at '1,2' is no place"),
+        (["bioloid", "--at", "1,2"], "--at '1,2' is no point"),
         (["bioloid", "--at", "0,nan,0"], "NaN"),
         (["bioloid", "--point", "a,b,c"], "--point"),
     ],

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from screwkin.cli.folder import output_folder
-from screwkin.cli.options import place, settings
+from screwkin.cli.options import point_of, settings
 from screwkin.cli.output import aligned, plain, print_json, progress_bar
 from screwkin.errors import InputError
 
@@ -74,10 +74,10 @@ def test_a_default_folder_is_named_by_time_verb_and_robot_and_is_new(tmp_path, m
 @pytest.mark.parametrize("text", ["1,2", "1,2,3,4", "a,b,c", "1,2,inf", ""])
 def test_a_place_is_three_finite_numbers(text):
     with pytest.raises(InputError, match="--at"):
-        place(text, "--at")
+        point_of(text, "--at")
 
 
 def test_places_and_settings_are_read():
-    assert place("1, -2,3e1", "--at") == (1.0, -2.0, 30.0)
-    assert place(None, "--at") is None
+    assert point_of("1, -2,3e1", "--at") == (1.0, -2.0, 30.0)
+    assert point_of(None, "--at") is None
     assert settings(["Tc = 1.2", "x=a=b"]) == {"Tc": "1.2", "x": "a=b"}

@@ -23,7 +23,7 @@ def sent(tmp_path_factory) -> Path:
     (folder / "validation.json").write_text(json.dumps(verdict), encoding="utf-8")
     log = str(folder / "sent")
     assert run(["send", str(path), "--virtual", "--go", "-o", log, "--json"]) == 0
-    early = ["--trouble", "pulled@2.5", "-o", str(folder / "cut")]
+    early = ["--inject-fault", "pulled@2.5", "-o", str(folder / "cut")]
     assert run(["send", str(path), "--virtual", "--go", *early, "--json"]) == 4
     return folder
 

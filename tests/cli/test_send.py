@@ -119,8 +119,8 @@ def test_positions_beyond_the_limits_are_refused_with_joint_and_time(cli, refuse
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["--trouble", "deaf@3"], "--trouble is for virtual servos"),
-        (["--virtual", "--trouble", "fire@3"], "unknown kind 'fire'"),
+        (["--inject-fault", "deaf@3"], "--inject-fault is for virtual servos"),
+        (["--virtual", "--inject-fault", "fire@3"], "unknown kind 'fire'"),
         (["--go"], "--go needs a bus"),
         (["--port", "/dev/none", "--virtual"], "two buses"),
         (["--rate", "nan"], "rate"),
@@ -169,7 +169,7 @@ def test_servos_far_from_the_first_goal_are_refused_and_nothing_is_written(cli, 
 
 
 def test_a_trouble_stops_the_play_and_all_is_told(cli, passed, tmp_path):
-    words = ["--virtual", "--go", "--trouble", "deaf@2:11", "--on-fault", "limp", "-o", tmp_path / "out"]
+    words = ["--virtual", "--go", "--inject-fault", "deaf@2:11", "--on-fault", "limp", "-o", tmp_path / "out"]
     called = cli("send", passed, *words, "--json")
     assert called.code == 4
     assert "lost fault at 2." in called.err
@@ -185,7 +185,7 @@ def test_a_trouble_stops_the_play_and_all_is_told(cli, passed, tmp_path):
 
 def test_a_cable_pulled_in_mid_walk_ends_within_200_ms_with_a_log(cli, passed, tmp_path):
     """In simulated time; the play begins some 50 ms after the bus was opened."""
-    words = ["--virtual", "--go", "--trouble", "pulled@2.5", "-o", tmp_path / "out", "--json"]
+    words = ["--virtual", "--go", "--inject-fault", "pulled@2.5", "-o", tmp_path / "out", "--json"]
     called = cli("send", passed, *words)
     assert called.code == 4
     assert "line fault at 2.4" in called.err
@@ -195,7 +195,7 @@ def test_a_cable_pulled_in_mid_walk_ends_within_200_ms_with_a_log(cli, passed, t
 
 
 def test_a_cable_pulled_before_anything_moved_is_refused(cli, refused, passed, tmp_path):
-    words = ["--virtual", "--go", "--trouble", "pulled@0.01", "-o", tmp_path / "out"]
+    words = ["--virtual", "--go", "--inject-fault", "pulled@0.01", "-o", tmp_path / "out"]
     assert "the port is gone" in refused(cli("send", passed, *words), 4)
     assert not (tmp_path / "out").exists()
 

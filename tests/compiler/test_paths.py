@@ -18,7 +18,7 @@ from screwkin.dynamics.newton_euler import GRAVITY
 from screwkin.dynamics.quantities import balance
 from screwkin.ik import programs as limbs
 from screwkin.kinematics import body
-from screwkin.mechanism.tip_motion import follows, motion
+from screwkin.mechanism.tip_motion import follows, motion_program
 from tests.kinematics.machines import random_state, random_tree
 
 PATHS = ["python", "numpy", *(["C"] if native.compiler() else [])]
@@ -42,7 +42,7 @@ def test_rates_and_tips_are_those_of_davies_method(name, path):
     upright = sk.State(
         sk.home(robot).T_world_base, state.q
     )  # Euler rates of the waist are singular at 90 deg
-    program, mechanism = motion.program(robot), sk.closed_mechanism(robot)
+    program, mechanism = motion_program(robot), sk.closed_mechanism(robot)
     inputs = {g.name: rng.uniform(-1, 1, (len(state.q), *g.shape)) for g in program.inputs}
     inputs |= {"T_world_base": upright.T_world_base, "q": upright.q}
     found = run(program, inputs, path=path)
@@ -60,7 +60,7 @@ def test_rates_and_tips_are_those_of_davies_method(name, path):
 def test_accelerations_are_the_slopes_of_the_rates(name):
     """Base and tips move with constant rates of change; the kernel's accelerations against differences."""
     robot = sk.load_robot(name)
-    program, rates = motion.program(robot, True), motion.program(robot)
+    program, rates = motion_program(robot, True), motion_program(robot)
     state, rng = moving(robot, 8)
     inputs = {g.name: rng.uniform(-0.05, 0.05, (8, *g.shape)) for g in program.inputs}
     inputs |= {"T_world_base": state.T_world_base, "q": state.q}

@@ -263,3 +263,14 @@ def test_a_stance_tells_all_its_faults(stance):
     one = Foot("right_foot", -1, ((0.0, 0.0), (1.0, 0.0)))
     with pytest.raises(ShapeError, match=r"one \+1 \(left\).*foot_y is nan.*sole of right_foot"):
         Stance(float("nan"), (one, one))
+
+
+@pytest.mark.parametrize("preset", ["walk", "turn", "smooth"])
+def test_a_rate_that_cannot_show_the_swing_is_refused(preset: str, stance) -> None:
+    gait = load_gait(preset)
+    with pytest.raises(
+        GaitError, match=r"key rate: 50 per second is 0\.\d+ samples in a swing of .* raise rate"
+    ):
+        plan(gait.replace(Tc=0.01), stance, 2)
+    made = plan(gait.replace(Tc=0.01, rate=320), stance, 2)
+    assert not made.contact.all()

@@ -11,7 +11,7 @@ from screwkin.gait.footsteps import footholds
 from screwkin.gait.plan import plan
 from screwkin.gait.preview import follow_reference, preview_gains
 from screwkin.gait.preview_plan import preview_plan, zmp_reference
-from screwkin.gait.realise import stance_of
+from screwkin.gait.stance import stance_of
 from screwkin.model.library import find_robot
 from screwkin.model.table import parse_robot
 
@@ -32,7 +32,7 @@ def walked(robot: sk.Robot, gait: sk.Gait) -> sk.Trajectory:
 
 
 def test_fifteen_phases_of_a_second_are_750_samples(robot: sk.Robot, gait: sk.Gait) -> None:
-    made = preview_plan(robot, sk.closed_mechanism(robot), gait.replace(com="waist"), 13)
+    made = preview_plan(sk.closed_mechanism(robot), gait.replace(com="waist"), stance_of(robot), 13)
     assert len(made.time) == 750
     assert made.time[-1] == pytest.approx(14.98)
     assert made.contact[:50].all()

@@ -41,7 +41,9 @@ def by_records(quantity: Quantity, subject, *choices, optional=(), inputs):
         for own in definition.arguments(getattr(subject, "robot", subject), given).values()
         for a in own
     ]
-    found = definition.by_formula(subject, given, choices, [inputs[name] for name in names])
+    found = definition.by_formula(
+        subject, given, definition.chosen(choices), [inputs[name] for name in names]
+    )
     return found if isinstance(found, dict) else {definition.name: found}
 
 
@@ -136,7 +138,7 @@ def test_arguments_are_bound_as_python_binds_them() -> None:
     for args, options in (
         ((robot, state), {}),
         ((robot, state, "left_foot"), {"frame": "right_foot"}),
-        ((robot, state, "left_foot", None, 1), {}),
+        ((robot, state, "left_foot", None, "base", 1), {}),
         ((robot, state, "left_foot"), {"links": 3}),
     ):
         with pytest.raises(TypeError):
@@ -145,12 +147,23 @@ def test_arguments_are_bound_as_python_binds_them() -> None:
 
 def test_wrong_kinds_are_refused_in_words() -> None:
     robot = sk.load_robot("poppy12")
-    with pytest.raises(InputError, match=r"link_poses takes a robot from load_robot\(\.\.\.\), not str"):
+    with pytest.raises(InputError, match=r"robot is the str .*poppy12.*, expected Robot; give load_robot"):
         sk.link_poses("poppy12", sk.home(robot))
-    with pytest.raises(InputError, match=r"takes State\(T_world_base, q\), not ndarray"):
+    with pytest.raises(InputError, match=r"state is .*ndarray, expected State; give State\("):
         sk.link_poses(robot, np.zeros(12))
-    with pytest.raises(InputError, match="takes a mechanism"):
+    with pytest.raises(InputError, match="mechanism is the int 42"):
         sk.network_matrix(42, sk.home(robot))
+
+
+def test_robots_with_loops_are_refused_where_only_their_tree_would_be_seen() -> None:
+    robot = sk.load_robot("linkages/four-bar")
+    state, rest = sk.home(robot), np.zeros(len(robot.joints))
+    for ask in (
+        lambda: sk.mass_matrix(robot, state),
+        lambda: sk.inverse_dynamics(robot, state, rest, rest),
+    ):
+        with pytest.raises(InputError, match=r"closures \(loop\).*secondary_rates"):
+            ask()
 
 
 def test_a_search_over_robots_keeps_neither_robots_nor_programs() -> None:

@@ -154,7 +154,6 @@ def test_the_slider_follows_its_closed_form_and_its_derivatives_by_sympy(mechani
 
 
 def test_the_sliders_acceleration_is_the_second_derivative_by_sympy(mechanisms):
-    from screwkin.mechanism.network import coupling_twists, network_matrix
     from screwkin.mechanism.rates import secondary_accelerations, secondary_rates
 
     mechanism = mechanisms["slider-crank"]
@@ -163,13 +162,13 @@ def test_the_sliders_acceleration_is_the_second_derivative_by_sympy(mechanisms):
     lift = p["offset"] - p["crank"] * sympy.sin(t)
     x = p["crank"] * sympy.cos(t) + sympy.sqrt(p["rod"] ** 2 - lift**2)
     state = sk.home(mechanism.robot)
-    twists = coupling_twists(mechanism, UNTURNED, list(state.q))
-    N = network_matrix(mechanism, twists)
     speed = 3.0
     rates = np.empty(4)
     rates[mechanism.primary_columns] = speed
-    rates[mechanism.secondary_columns] = secondary_rates(mechanism, N, np.array([speed])).values
-    found = secondary_accelerations(mechanism, twists, N, rates, np.array([0.0])).values
+    rates[mechanism.secondary_columns] = secondary_rates(
+        mechanism, state.T_world_base, state.q, np.array([speed])
+    ).values
+    found = secondary_accelerations(mechanism, state.T_world_base, state.q, rates, np.array([0.0])).values
     wanted = speed**2 * float(sympy.diff(x, t, 2).subs(t, state.q[0]))
     assert found[mechanism.secondary.index("slider")] == pytest.approx(wanted, rel=1e-12)
 

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 import screwkin as sk
 from screwkin.algebra.se3 import Twist, Vector, as_array, exp
-from screwkin.mechanism.choice import characteristic_length, mobility_at, normalised
+from screwkin.mechanism.choice import mobility_at
+from screwkin.mechanism.scaling import referenced
 from screwkin.model.table import load_robot
 from tests.kinematics.machines import array_of, random_mechanism
 
@@ -69,7 +70,7 @@ def test_the_kernel_of_n_has_the_dimension_of_the_mobility(seed):
     robot = random_mechanism(seed)
     mechanism = sk.closed_mechanism(robot)
     N = sk.network_matrix(mechanism, sk.home(robot))
-    singular = np.linalg.svd(normalised(N, characteristic_length(robot)), compute_uv=False)
+    singular = np.linalg.svd(referenced(mechanism, N), compute_uv=False)
     kernel = N.shape[1] - int((singular > 1e-9 * singular[0]).sum())
     assert kernel == mechanism.mobility == mobility_at(mechanism, N)
     assert mechanism.kutzbach == kernel, "random geometry is not special"

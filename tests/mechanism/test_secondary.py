@@ -6,24 +6,17 @@ import numpy as np
 import pytest
 
 import screwkin as sk
-from screwkin.algebra.se3 import pose_from_array, unstack
 from screwkin.compiler.run import run
 from screwkin.errors import SingularError
-from screwkin.mechanism import rates
-from screwkin.mechanism.choice import RANK_TOLERANCE
-from screwkin.mechanism.network import coupling_twists, network_matrix
-from screwkin.mechanism.secondary import followers, secondary_rates
+from screwkin.mechanism.rates import CERTIFIED, secondary_rates
+from screwkin.mechanism.secondary import secondary_program
 from tests.compiler.robots import with_leg
 from tests.ik.legs import random_parallel_leg, random_spherical_leg
 from tests.kinematics.machines import random_state
+from tests.mechanism.oracle import davies, least_values_of, network_of
 
 MANY = 8 * 1000
 """Samples that are worth a program at once."""
-
-
-def davies(mechanism, state, primary):
-    twists = coupling_twists(mechanism, pose_from_array(state.T_world_base).R, unstack(state.q))
-    return rates.secondary_rates(mechanism, network_matrix(mechanism, twists, (len(state.q),)), primary)
 
 
 CHOICES = [
@@ -44,15 +37,16 @@ def test_rates_are_those_of_the_network_matrix(name, exchanged):
         mechanism = sk.closed_mechanism(robot, [imposed.get(x, x) for x in mechanism.primary])
     state = random_state(robot, 5, (300,))
     primary = np.random.default_rng(6).uniform(-1, 1, (300, len(mechanism.primary)))
-    expected = davies(mechanism, state, primary)
-    found, singular = secondary_rates(mechanism, state.T_world_base, state.q, primary)
-    assert not singular.any()
-    size = np.abs(expected.values).max(axis=1, keepdims=True) / expected.sigma.min(axis=1, keepdims=True)
-    assert (np.abs(found - expected.values) <= 1e-12 * np.maximum(size, 1.0)).all()
+    N = network_of(mechanism, state)
+    expected, sigma = davies(mechanism, N, primary), least_values_of(mechanism, N)
+    solution = secondary_rates(mechanism, state.T_world_base, state.q, primary)
+    assert not solution.singular.any()
+    size = np.abs(expected).max(axis=1, keepdims=True) / sigma.min(axis=1, keepdims=True)
+    assert (np.abs(solution.values - expected) <= 1e-12 * np.maximum(size, 1.0)).all()
     told = {"T_world_base": state.T_world_base, "q": state.q, "primary": primary}
-    least = run(followers(robot, mechanism.primary, mechanism.secondary), told)["least"]
-    assert (least <= expected.sigma * (1 + 1e-9)).all()
-    assert (least > RANK_TOLERANCE).all(axis=1).mean() > 0.95  # the program decides nearly all
+    least = run(secondary_program(robot, mechanism.primary, mechanism.secondary), told)["least"]
+    assert (least <= sigma * (1 + 1e-9)).all()
+    assert (least > CERTIFIED).all(axis=1).mean() > 0.95  # the program decides nearly all
 
 
 @pytest.mark.parametrize(
@@ -63,11 +57,12 @@ def test_legs_with_any_axes_follow(leg):
     mechanism = sk.closed_mechanism(robot)
     state = random_state(robot, 23, (300,))
     primary = np.random.default_rng(24).uniform(-1, 1, (300, len(mechanism.primary)))
-    expected = davies(mechanism, state, primary)
-    found, singular = secondary_rates(mechanism, state.T_world_base, state.q, primary)
-    assert not singular.any()
-    size = np.abs(expected.values).max(axis=1, keepdims=True) / expected.sigma.min(axis=1, keepdims=True)
-    assert (np.abs(found - expected.values) <= 1e-12 * np.maximum(size, 1.0)).all()
+    N = network_of(mechanism, state)
+    expected, sigma = davies(mechanism, N, primary), least_values_of(mechanism, N)
+    solution = secondary_rates(mechanism, state.T_world_base, state.q, primary)
+    assert not solution.singular.any()
+    size = np.abs(expected).max(axis=1, keepdims=True) / sigma.min(axis=1, keepdims=True)
+    assert (np.abs(solution.values - expected) <= 1e-12 * np.maximum(size, 1.0)).all()
 
 
 def test_large_batches_are_refused_and_marked_as_small_ones_are():
@@ -75,7 +70,7 @@ def test_large_batches_are_refused_and_marked_as_small_ones_are():
     mechanism = sk.closed_mechanism(robot)
     state = random_state(robot, 7, (MANY,))
     primary = np.random.default_rng(8).uniform(-1, 1, (MANY, len(mechanism.primary)))
-    expected = davies(mechanism, state, primary).values
+    expected = davies(mechanism, network_of(mechanism, state), primary)
     np.testing.assert_allclose(sk.secondary_rates(mechanism, state, primary), expected, rtol=1e-7, atol=1e-9)
     values, status = sk.secondary_rates(mechanism, state, primary, on_singular="status")
     np.testing.assert_allclose(values, expected, rtol=1e-7, atol=1e-9)

@@ -8,7 +8,7 @@ import pytest
 import screwkin as sk
 from screwkin.errors import SingularError
 from screwkin.kinematics.status import Status
-from screwkin.mechanism.rates import singular_values
+from screwkin.mechanism.least_values import least_values
 from screwkin.mechanism.singularity import singularity_report
 from screwkin.model.table import load_robot
 
@@ -50,8 +50,9 @@ def test_at_home_nothing_is_near_a_singularity(mechanism):
     assert list(found) == ["right_leg", "left_leg", "right_arm", "left_arm"]
     assert not any(entry.near for entry in found.values())
     assert all(entry.cause == "" for entry in found.values())
-    N = sk.network_matrix(mechanism, sk.home(mechanism.robot))
-    np.testing.assert_allclose([entry.sigma for entry in found.values()], singular_values(mechanism, N))
+    home = sk.home(mechanism.robot)
+    expected = least_values(mechanism, home.T_world_base, home.q)
+    np.testing.assert_allclose([entry.sigma for entry in found.values()], expected)
 
 
 CASES = [

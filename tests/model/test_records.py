@@ -230,7 +230,7 @@ def test_closures_are_refused_with_the_function_that_honours_them() -> None:
     with pytest.raises(
         InputError, match=r"four-bar has closures \(loop\), and mass_matrix sees .*; use that"
     ):
-        refuse_closures(robot, "mass_matrix", "that")
+        refuse_closures(robot, "mass_matrix", "use that")
     assert isinstance(robot.closures[0], Closure)
     assert np.isfinite(sk.home(robot).q).all()
     assert MINI

@@ -41,11 +41,11 @@ from screwkin.gait.walk import walk
 from screwkin.model.table import load_robot
 from screwkin.model.toml_out import robot_toml
 from screwkin.servo.virtual.bus import VirtualBus
-from screwkin.servo.virtual.faults import KINDS, Trouble
+from screwkin.servo.virtual.faults import KINDS, InjectedFault
 from screwkin.trajectory import load_trajectory
 
 OTHERS = ("stalled", "interrupted")
-"""Troubles of the computer, not of the bus: it stands still for a moment; the user presses Ctrl-C."""
+"""Faults of the computer, not of the bus: it stands still for a moment; the user presses Ctrl-C."""
 ALL_KINDS = (*KINDS, *OTHERS)
 OF_ANSWERS = ("deaf", "dropped", "corrupted", "truncated", "late", "noise")
 
@@ -96,11 +96,11 @@ class Plan:
         )
 
     @property
-    def troubles(self) -> list[Trouble]:
+    def faults(self) -> list[InjectedFault]:
         """What the virtual bus is told of it."""
         if self.kind in OTHERS:
             return []
-        return [Trouble(self.kind, self.at, self.until, self.id, self.share, self.volts)]
+        return [InjectedFault(self.kind, self.at, self.until, self.id, self.share, self.volts)]
 
 
 @dataclass
@@ -135,7 +135,7 @@ class Watched(VirtualBus):
         rng = np.random.default_rng((plan.seed, 1))
         for servo in servos:
             servo.body.angle += float(rng.uniform(-0.15, 0.15))
-        super().__init__(servos, clock, baud, plan.troubles, plan.seed, self._witness_of_all, adapter)
+        super().__init__(servos, clock, baud, plan.faults, plan.seed, self._witness_of_all, adapter)
 
     def _witness_of_all(self, time: float, id: int, command: Any) -> None:
         if command.kind in ("write", "register"):

@@ -169,7 +169,7 @@ def test_a_joint_whose_limits_its_servo_cannot_reach_is_refused():
 
 def test_a_speed_that_a_servo_cannot_be_told_is_refused_and_not_taken_for_none():
     """A speed register of 0 would mean no limit at all."""
-    with pytest.raises(SafetyError, match="less than its servo can be told"):
+    with pytest.raises(SafetyError, match="less than its servo's smallest speed"):
         Bounds.of(narrow(BIOLOID, velocity=0.01))
 
 

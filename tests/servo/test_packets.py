@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-import time
+import re
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,9 +13,16 @@ from dynamixel_sdk.protocol2_packet_handler import Protocol2PacketHandler
 from hypothesis import given
 from hypothesis import strategies as st
 
+import screwkin
+from screwkin.errors import InputError
 from screwkin.servo import protocol1, protocol2
-from screwkin.servo.packets import Command, Packet
-from screwkin.servo.protocols import codec
+from screwkin.servo.packets import Packet, Request
+from screwkin.servo.profiles import load_profile
+from screwkin.servo.protocols import CODECS, codec
+from screwkin.servo.virtual.bus import SimulatedClock, VirtualBus
+from screwkin.servo.virtual.servo import VirtualServo
+
+PACKAGE = Path(screwkin.__file__).parent
 
 BOTH = pytest.mark.parametrize("protocol", [protocol1, protocol2], ids=["1.0", "2.0"])
 packets_of = st.builds(
@@ -138,7 +148,7 @@ def test_a_hundred_thousand_damaged_streams_never_deceive(protocol):
         for i, k, n in zip(*(random.integers(0, high, 200) for high in (253, 127, 20)), strict=True)
     ]
     noise = random.choice(alphabet, (50_000, 24)).tobytes()
-    began, found = time.process_time(), 0
+    found = 0
     for k in range(50_000):
         stream = bytearray(sound[k % 200] + sound[(k * 7 + 3) % 200])
         place = k * 31 % len(stream)
@@ -157,21 +167,25 @@ def test_a_hundred_thousand_damaged_streams_never_deceive(protocol):
                 assert protocol.pack(packet) in text
             found += len(packets)
     assert found > 40_000
-    assert time.process_time() - began < 10.0
 
 
 @BOTH
-def test_the_worst_streams_take_no_longer_than_their_length(protocol):
-    for text in (b"\xff" * 100_000, b"\xff\xff\xfd\x00" * 25_000, b"\xff\xff\x01\xff" * 2_000):
-        began = time.process_time()
-        protocol.parse(text, ended=True)
-        assert time.process_time() - began < 2.0
+@pytest.mark.parametrize("pattern", ["FF", "FF FF FD 00", "FF FF 01 FF", "FF FF FD 00 01 00 04"])
+def test_the_worst_streams_are_read_once_per_longest_packet(protocol, pattern, monkeypatch):
+    """Work grows with the length of a stream: each byte begins at most one packet that is looked into."""
+    looked: list[int] = []
+    opened = protocol._opened
+    monkeypatch.setattr(protocol, "_opened", lambda data: (looked.append(len(data)), opened(data))[1])
+    text = hexed(pattern) * 2_000
+    protocol.parse(text, ended=True)
+    assert len(looked) <= len(text)
+    assert max(looked, default=0) <= (259 if protocol is protocol1 else 1031)
 
 
 def test_a_sync_write_concerns_those_it_names():
     packet = Packet(0xFE, 0x83, hexed("1E 04 00 10 00 50 01 01 20 02 60 03"))
-    assert protocol1.command_for(packet, 0) == Command("write", 30, data=hexed("10 00 50 01"), answers=False)
-    assert protocol1.command_for(packet, 1) == Command("write", 30, data=hexed("20 02 60 03"), answers=False)
+    assert protocol1.command_for(packet, 0) == Request("write", 30, data=hexed("10 00 50 01"), answers=False)
+    assert protocol1.command_for(packet, 1) == Request("write", 30, data=hexed("20 02 60 03"), answers=False)
     assert protocol1.command_for(packet, 2) is None
     torn = Packet(0xFE, 0x83, packet.params[:-1])
     assert protocol1.command_for(torn, 0) is None
@@ -179,14 +193,14 @@ def test_a_sync_write_concerns_those_it_names():
 
 def test_reads_of_many_are_answered_in_turn():
     bulk = Packet(0xFE, 0x92, hexed("00 02 01 1E 04 02 24"))
-    assert protocol1.command_for(bulk, 2) == Command("read", 0x24, 4, after=(1,))
+    assert protocol1.command_for(bulk, 2) == Request("read", 0x24, 4, after=(1,))
     sync = Packet(0xFE, 0x82, hexed("84 00 04 00 03 01 02"))
-    assert protocol2.command_for(sync, 2) == Command("read", 132, 4, after=(3, 1))
+    assert protocol2.command_for(sync, 2) == Request("read", 132, 4, after=(3, 1))
     bulk2 = Packet(0xFE, 0x92, hexed("01 90 00 02 00 02 92 00 01 00"))
-    assert protocol2.command_for(bulk2, 2) == Command("read", 146, 1, after=(1,))
+    assert protocol2.command_for(bulk2, 2) == Request("read", 146, 1, after=(1,))
     write = Packet(0xFE, 0x93, hexed("01 20 00 02 00 A0 00 02 1F 00 01 00 50"))
-    assert protocol2.command_for(write, 2) == Command("write", 31, data=b"\x50", answers=False)
-    assert protocol2.command_for(Packet(0xFE, 1), 4) == Command("ping", after=(0, 1, 2, 3))
+    assert protocol2.command_for(write, 2) == Request("write", 31, data=b"\x50", answers=False)
+    assert protocol2.command_for(Packet(0xFE, 1), 4) == Request("ping", after=(0, 1, 2, 3))
 
 
 @BOTH
@@ -199,9 +213,29 @@ def test_any_packet_can_be_asked_what_it_wants(protocol, packet):
 
 def test_a_broadcast_is_carried_out_and_not_answered():
     command = protocol1.command_for(Packet(0xFE, 3, hexed("18 01")), 5)
-    assert command == Command("write", 24, data=b"\x01", answers=False)
+    assert command == Request("write", 24, data=b"\x01", answers=False)
 
 
 def test_the_codec_is_that_of_the_protocol():
     assert codec(1.0).pack(Packet(1, 1)) == hexed("FF FF 01 02 01 FB")
     assert codec(2.0).pack(Packet(1, 1)) == hexed("FF FF FD 00 01 03 00 01 19 4E")
+
+
+def test_a_further_protocol_is_one_file_and_one_row(monkeypatch):
+    """Its servo answers on a virtual bus, and nothing else compares the numbers of protocols."""
+    further = SimpleNamespace(**{**vars(protocol1), "FACTS": replace(protocol1.FACTS, number=3.0)})
+    monkeypatch.setitem(CODECS, 3.0, further)
+    clock = SimulatedClock()
+    bus = VirtualBus([VirtualServo(replace(load_profile("AX-12A"), protocol=3.0), 7)], clock)
+    bus.write(further.pack(Packet(7, 1)))
+    clock.sleep(0.01)
+    assert further.parse(bus.read(64)) == ([Packet(7, 0)], b"")
+
+    assert all(number == file.FACTS.number for number, file in CODECS.items())
+    sources = [path for folder in ("servo", "cli") for path in (PACKAGE / folder).rglob("*.py")]
+    assert not [path for path in sources if re.search(r"protocol (==|!=) \d", path.read_text("utf-8"))]
+
+
+def test_a_protocol_that_there_is_not_is_refused():
+    with pytest.raises(InputError, match=r"invalid protocol 1\.5; expected 1\.0 or 2\.0"):
+        codec(1.5)

@@ -21,7 +21,7 @@ from screwkin.servo.player import Player, PlaySettings, describe, frames_of
 from screwkin.servo.profiles import load_profile
 from screwkin.servo.servo_map import ServoMap
 from screwkin.servo.virtual.bus import SimulatedClock, VirtualBus
-from screwkin.servo.virtual.faults import Trouble
+from screwkin.servo.virtual.faults import InjectedFault
 from screwkin.servo.virtual.servo import VirtualServo
 from screwkin.trajectory import Trajectory
 
@@ -37,7 +37,9 @@ def steps() -> Trajectory:
 class Rig:
     """A player on virtual servos that stand in the home posture; every command to a servo is kept."""
 
-    def __init__(self, *troubles: Trouble, robot: Robot = ROBOT, seed: int = 0, **settings: object) -> None:
+    def __init__(
+        self, *faults: InjectedFault, robot: Robot = ROBOT, seed: int = 0, **settings: object
+    ) -> None:
         self.clock, self.told = SimulatedClock(), []
         servos = ServoMap.of(robot)
         self.line = VirtualBus(
@@ -46,7 +48,7 @@ class Rig:
                 for s, angle in zip(servos.joints, robot.posture("home").q, strict=True)
             ],
             self.clock,
-            troubles=troubles,
+            faults=faults,
             seed=seed,
             witness=lambda time, id, command: self.told.append((time, id, command)),
         )
@@ -115,7 +117,7 @@ def test_servos_that_are_far_are_refused_before_anything_is_written():
 
 
 def test_all_that_is_wrong_with_a_found_bus_is_told_at_once():
-    rig = Rig(Trouble("deaf", id=3), Trouble("brown-out", id=9, volts=7.0))
+    rig = Rig(InjectedFault("deaf", id=3), InjectedFault("brown-out", id=9, volts=7.0))
     rig.line.servo(5).put("model_number", 29)
     with pytest.raises(SafetyError) as caught:
         rig.play()
@@ -126,26 +128,26 @@ def test_all_that_is_wrong_with_a_found_bus_is_told_at_once():
 
 @pytest.mark.parametrize("state", ["hold", "limp"])
 @pytest.mark.parametrize(
-    ("trouble", "kinds"),
+    ("injected", "kinds"),
     [
-        (Trouble("deaf", WITHIN, id=11), {"lost"}),
-        (Trouble("dropped", WITHIN, WITHIN + 1.0), {"lost"}),
-        (Trouble("corrupted", WITHIN, id=11), {"lost"}),
-        (Trouble("truncated", WITHIN, id=11), {"lost"}),
-        (Trouble("late", WITHIN, id=11), {"lost"}),
-        (Trouble("overheat", WITHIN, id=11), {"servo", "temperature"}),
-        (Trouble("brown-out", WITHIN, id=11, volts=7.0), {"servo", "voltage"}),
-        (Trouble("overload", WITHIN, id=11), {"servo", "load", "tracking", "torque"}),
-        (Trouble("reset", WITHIN, id=11), {"lost", "torque"}),
+        (InjectedFault("deaf", WITHIN, id=11), {"lost"}),
+        (InjectedFault("dropped", WITHIN, WITHIN + 1.0), {"lost"}),
+        (InjectedFault("corrupted", WITHIN, id=11), {"lost"}),
+        (InjectedFault("truncated", WITHIN, id=11), {"lost"}),
+        (InjectedFault("late", WITHIN, id=11), {"lost"}),
+        (InjectedFault("overheat", WITHIN, id=11), {"servo", "temperature"}),
+        (InjectedFault("brown-out", WITHIN, id=11, volts=7.0), {"servo", "voltage"}),
+        (InjectedFault("overload", WITHIN, id=11), {"servo", "load", "tracking", "torque"}),
+        (InjectedFault("reset", WITHIN, id=11), {"lost", "torque"}),
     ],
-    ids=lambda value: value.kind if isinstance(value, Trouble) else "",
+    ids=lambda value: value.kind if isinstance(value, InjectedFault) else "",
 )
-def test_a_fault_stops_the_play_and_leaves_the_announced_state(trouble, kinds, state):
-    rig = Rig(trouble, on_fault=state, torque=0.9)
+def test_a_fault_stops_the_play_and_leaves_the_announced_state(injected, kinds, state):
+    rig = Rig(injected, on_fault=state, torque=0.9)
     outcome = rig.play()
     [fault] = outcome.faults
     assert fault.kind in kinds, str(fault)
-    if trouble.id is not None:
+    if injected.id is not None:
         assert (fault.joint, fault.id) == ("right_hip_pitch", 11)
     assert 0.5 < fault.time < WITHIN + 1.5
     arrays = rig.player.log.arrays({})
@@ -154,11 +156,11 @@ def test_a_fault_stops_the_play_and_leaves_the_announced_state(trouble, kinds, s
     rig.clock.sleep(1.0)
     rig.line.advance()
     given_up = {rig.player.servos.joint(name).id for name in outcome.final.unconfirmed}
-    if trouble.kind == "overload":
+    if injected.kind == "overload":
         given_up.add(11)  # who goes on being overloaded shuts itself down some time, whatever it was told
     confirmed = [servo for servo in rig.line.servos if servo.id not in given_up]
     if outcome.final.state == "unknown":
-        assert trouble.kind == "dropped"
+        assert injected.kind == "dropped"
         assert state == "hold" or rig.all("torque_enable") == {0}, "limp even where nobody confirms it"
     else:
         assert outcome.final.state == state
@@ -169,7 +171,7 @@ def test_a_fault_stops_the_play_and_leaves_the_announced_state(trouble, kinds, s
 
 
 def test_a_pulled_cable_ends_the_play_at_once():
-    rig = Rig(Trouble("pulled", WITHIN))
+    rig = Rig(InjectedFault("pulled", WITHIN))
     outcome = rig.play()
     assert rig.clock.now() - WITHIN < 0.2
     assert (outcome.faults[0].kind, outcome.final.state) == ("line", "unknown")
@@ -178,14 +180,16 @@ def test_a_pulled_cable_ends_the_play_at_once():
 
 
 def test_silence_of_all_servos_ends_the_play_within_200_ms():
-    rig = Rig(Trouble("deaf", WITHIN))
+    rig = Rig(InjectedFault("deaf", WITHIN))
     outcome = rig.play()
     assert rig.clock.now() - WITHIN < 0.2
     assert (outcome.faults[0].kind, outcome.final.state) == ("lost", "unknown")
 
 
 def test_single_lost_replies_do_not_stop_a_walk():
-    outcome = Rig(Trouble("dropped", 1.5, share=0.02), Trouble("noise", 1.5, share=0.05), seed=3).play()
+    outcome = Rig(
+        InjectedFault("dropped", 1.5, share=0.02), InjectedFault("noise", 1.5, share=0.05), seed=3
+    ).play()
     assert outcome.faults == ()
 
 

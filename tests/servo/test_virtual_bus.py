@@ -17,7 +17,7 @@ from screwkin.servo.protocols import codec
 from screwkin.servo.servo_map import ServoMap
 from screwkin.servo.virtual.body import follow
 from screwkin.servo.virtual.bus import SimulatedClock, VirtualBus
-from screwkin.servo.virtual.faults import KINDS, Trouble
+from screwkin.servo.virtual.faults import KINDS, InjectedFault
 from screwkin.servo.virtual.robot import virtual_servos
 from screwkin.servo.virtual.servo import VirtualServo
 
@@ -28,10 +28,10 @@ MX = load_profile("MX-28-2")
 class Line:
     """One or more servos in memory, asked through the packets of their protocol."""
 
-    def __init__(self, profile=AX, count=2, troubles=(), **settings):
+    def __init__(self, profile=AX, count=2, faults=(), **settings):
         self.profile, self.clock = profile, SimulatedClock()
         self.servos = [VirtualServo(profile, k + 1, **settings) for k in range(count)]
-        self.bus = VirtualBus(self.servos, self.clock, troubles=troubles)
+        self.bus = VirtualBus(self.servos, self.clock, faults=faults)
         self.codec = codec(profile.protocol)
 
     def send(self, id, instruction, params=b"", wait=0.01):
@@ -95,7 +95,7 @@ def test_the_output_yields_to_a_load_by_the_stiffness():
 
 
 def test_a_lasting_overload_takes_the_torque_away_until_it_is_switched_on_again():
-    line = Line(troubles=[Trouble("overload", at=0.1, until=2.0, id=1)])
+    line = Line(faults=[InjectedFault("overload", at=0.1, until=2.0, id=1)])
     line.write(1, "goal_position", 700)
     line.write(2, "goal_position", 700)
     line.clock.sleep(1.0)
@@ -228,7 +228,7 @@ def test_what_follows_a_corrupt_command_is_obeyed(profile):
 
 @pytest.mark.parametrize("kind", ["deaf", "dropped", "corrupted", "truncated", "late", "noise", "reset"])
 def test_troubles_of_answers_begin_and_end_as_told(kind):
-    line = Line(troubles=[Trouble(kind, at=1.0, until=2.0, id=1)])
+    line = Line(faults=[InjectedFault(kind, at=1.0, until=2.0, id=1)])
     answers = []
     for _ in range(60):
         sound = line.send(1, 1, wait=0.05)
@@ -241,7 +241,7 @@ def test_troubles_of_answers_begin_and_end_as_told(kind):
 
 
 def test_a_reset_forgets_torque_and_stays_where_it_is():
-    line = Line(troubles=[Trouble("reset", at=1.0, id=1)])
+    line = Line(faults=[InjectedFault("reset", at=1.0, id=1)])
     line.write(1, "goal_position", 700)
     line.write(1, "moving_speed", 50)
     line.clock.sleep(2.0)
@@ -251,7 +251,7 @@ def test_a_reset_forgets_torque_and_stays_where_it_is():
 
 
 def test_the_cable_once_pulled_raises_from_then_on():
-    line = Line(troubles=[Trouble("pulled", at=0.5)])
+    line = Line(faults=[InjectedFault("pulled", at=0.5)])
     assert line.send(1, 1)
     line.clock.sleep(1.0)
     for act in (lambda: line.bus.write(b"x"), lambda: line.bus.read(1), lambda: line.bus.in_waiting):
@@ -260,7 +260,7 @@ def test_the_cable_once_pulled_raises_from_then_on():
 
 
 def test_below_four_volts_nothing_answers():
-    line = Line(troubles=[Trouble("brown-out", at=0.0, until=0.1, volts=3.0)])
+    line = Line(faults=[InjectedFault("brown-out", at=0.0, until=0.1, volts=3.0)])
     assert line.send(1, 1) == []
     line.clock.sleep(0.2)
     assert line.send(1, 1) == [Packet(1, 0)]
@@ -269,7 +269,9 @@ def test_below_four_volts_nothing_answers():
 def test_the_same_seed_brings_the_same_troubles():
     def heard(seed):
         clock = SimulatedClock()
-        bus = VirtualBus([VirtualServo(AX, 1)], clock, troubles=[Trouble("corrupted", share=0.5)], seed=seed)
+        bus = VirtualBus(
+            [VirtualServo(AX, 1)], clock, faults=[InjectedFault("corrupted", share=0.5)], seed=seed
+        )
         for _ in range(50):
             bus.write(bytes.fromhex("FFFF010201FB"))
             clock.sleep(0.01)
@@ -290,7 +292,7 @@ def test_a_witness_sees_every_command():
 @pytest.mark.parametrize("profile", [AX, MX], ids=lambda profile: profile.model)
 def test_no_bytes_whatever_upset_the_bus(profile):
     random = np.random.default_rng(1)
-    line = Line(profile, 3, troubles=[Trouble("noise", share=0.3), Trouble("corrupted", share=0.3)])
+    line = Line(profile, 3, faults=[InjectedFault("noise", share=0.3), InjectedFault("corrupted", share=0.3)])
     for _ in range(3000):
         id, kind = (
             int(random.choice((1, 2, 3, 7, 254))),
@@ -305,10 +307,10 @@ def test_no_bytes_whatever_upset_the_bus(profile):
 
 
 def test_troubles_unknown_or_contrary_are_refused():
-    with pytest.raises(InputError, match="unknown trouble 'fire'; valid: deaf"):
-        Trouble("fire")
+    with pytest.raises(InputError, match="unknown fault 'fire'; valid: deaf"):
+        InjectedFault("fire")
     with pytest.raises(InputError, match="at <= until"):
-        Trouble("late", at=2.0, until=1.0)
+        InjectedFault("late", at=2.0, until=1.0)
     assert len(KINDS) == 11
 
 

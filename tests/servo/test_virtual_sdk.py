@@ -14,7 +14,7 @@ import pytest
 
 from screwkin.servo.profiles import Profile, load_profile
 from screwkin.servo.virtual.bus import VirtualBus
-from screwkin.servo.virtual.faults import Trouble
+from screwkin.servo.virtual.faults import InjectedFault
 from screwkin.servo.virtual.servo import VirtualServo
 from screwkin.servo.virtual.terminal import PseudoTerminal
 
@@ -43,9 +43,9 @@ class Opened:
         writes = {1: self.driver.write1ByteTxRx, 2: self.driver.write2ByteTxRx, 4: self.driver.write4ByteTxRx}
         return writes[register.width](self.port, id, register.address, value)
 
-    def trouble(self, kind: str, **told: Any) -> None:
+    def inject(self, kind: str, **about: Any) -> None:
         with self.terminal.lock:
-            self.bus.trouble(Trouble(kind, at=time.monotonic(), **told))
+            self.bus.inject(InjectedFault(kind, at=time.monotonic(), **about))
 
 
 @pytest.fixture
@@ -167,9 +167,9 @@ def test_error_bits_of_protocol_1_are_the_makers(opened):
     assert line.write(1, "goal_position", 1024) == (sdk.COMM_SUCCESS, 0x02)
     assert line.write(1, "torque_limit", 2000) == (sdk.COMM_SUCCESS, 0x08)
     assert line.driver.readTxRx(line.port, 1, 60, 2)[1:] == (sdk.COMM_SUCCESS, 0x08)
-    line.trouble("brown-out", id=1)
+    line.inject("brown-out", id=1)
     assert line.read(1, "present_voltage") == (50, sdk.COMM_SUCCESS, 0x01)
-    line.trouble("overheat", id=2)
+    line.inject("overheat", id=2)
     assert line.read(2, "present_temperature") == (80, sdk.COMM_SUCCESS, 0x04)
 
 
@@ -179,7 +179,7 @@ def test_error_numbers_of_protocol_2_are_the_makers(opened):
     assert line.write(1, "present_position", 0) == (sdk.COMM_SUCCESS, 7)
     line.write(1, "torque_enable", 1)
     assert line.write(1, "return_delay", 0) == (sdk.COMM_SUCCESS, 7)  # locked while torque is on
-    line.trouble("overheat", id=1)
+    line.inject("overheat", id=1)
     assert line.read(1, "present_temperature") == (90, sdk.COMM_SUCCESS, 0x80)
     assert line.read(1, "hardware_error")[0] == 0x04
     assert line.read(1, "torque_enable")[0] == 0
@@ -195,7 +195,7 @@ def test_a_broadcast_ping_finds_all(opened):
 @MODELS
 def test_a_corrupt_answer_is_seen_and_the_next_is_good(opened, model):
     line = opened(model)
-    line.trouble("truncated", id=1)
+    line.inject("truncated", id=1)
     assert line.read(1, "present_position")[1] in (sdk.COMM_RX_CORRUPT, sdk.COMM_RX_TIMEOUT)
     assert line.read(2, "present_position")[1] == sdk.COMM_SUCCESS
 
@@ -223,7 +223,7 @@ def test_a_cable_that_is_pulled_is_an_error_of_the_port(opened, how):
     if how == "closed":
         line.terminal.close()
     else:
-        line.trouble("pulled")
+        line.inject("pulled")
         until(lambda: line.terminal.served, False)
     with pytest.raises(Exception, match=r"Input/output error|device|readiness"):  # noqa: PT012
         line.driver.ping(line.port, 1)

@@ -1,6 +1,6 @@
-"""The body of a virtual servo: how it moves, yields, warms up, and when it is in trouble.
+"""The body of a virtual servo: its motion, deflection under load, temperature and alarms.
 
-The motor follows its goal to first order with a limited speed; the output yields to the load on a spring. All
+The motor follows its goal to first order with a limited speed; the load deflects the output on a spring. All
 of it is in closed form, so that it does not matter how often one looks.
 """
 
@@ -40,7 +40,7 @@ class Body:
 
     @property
     def output(self) -> float:
-        """The angle of the output: the motor's, and what the spring yields."""
+        """The angle of the output: the motor's, and the deflection of the spring."""
         return self.angle + self.load / self.stiffness
 
     @property

@@ -16,9 +16,9 @@ from typing import Protocol
 
 import numpy as np
 
-from screwkin.servo.packets import BROADCAST, Command, Packet
+from screwkin.servo.packets import BROADCAST, Packet, Request
 from screwkin.servo.protocols import Codec, codec
-from screwkin.servo.virtual.faults import Trouble, deafened, suffered
+from screwkin.servo.virtual.faults import InjectedFault, affected, deafened
 from screwkin.servo.virtual.servo import VirtualServo
 
 _SILENCE = 0.005  # s, after which no more bytes of a packet are waited for
@@ -26,12 +26,12 @@ _BITS_PER_BYTE = 10
 _SAME_RATE = 0.03  # of the rate: what both ends of a line tolerate
 _SERVOS_OWN = ("reset", "overload", "overheat", "brown-out")
 
-Witness = Callable[[float, int, Command], None]
-"""Called with time, servo id and command whenever a servo is told something."""
+Witness = Callable[[float, int, Request], None]
+"""Called with time, servo id and command for every command that reaches a servo."""
 
 
-class Clock(Protocol):
-    """A clock that never goes back."""
+class Now(Protocol):
+    """The part of a clock that a bus reads."""
 
     def now(self) -> float:
         """Time [s]."""
@@ -59,18 +59,18 @@ class VirtualBus:
         servos: all of one protocol.
         clock: what time goes by.
         baud: the rate of the port, which may be changed later.
-        troubles: what goes wrong, and when; more by ``trouble``.
-        seed: of what is random in troubles.
-        witness: is told every command that reaches a servo.
+        faults: what goes wrong, and when; more by ``inject``.
+        seed: of what is random in faults.
+        witness: called for every command that reaches a servo.
         adapter: time that the port's adapter holds answers back [s].
     """
 
     def __init__(
         self,
         servos: Sequence[VirtualServo],
-        clock: Clock,
+        clock: Now,
         baud: int = 1_000_000,
-        troubles: Sequence[Trouble] = (),
+        faults: Sequence[InjectedFault] = (),
         seed: int = 0,
         witness: Witness | None = None,
         adapter: float = 0.0,
@@ -82,22 +82,22 @@ class VirtualBus:
         self._codec: Codec = codec(servos[0].profile.protocol if servos else 1.0)
         self._random = np.random.default_rng(seed)
         self._witness = witness
-        self._troubles: list[Trouble] = []
-        self._turns: list[tuple[float, bool, Trouble]] = []  # beginnings (True) and ends to come
+        self._faults: list[InjectedFault] = []
+        self._turns: list[tuple[float, bool, InjectedFault]] = []  # beginnings (True) and ends to come
         self._heard, self._last, self._free = b"", clock.now(), clock.now()
         self._coming: list[tuple[float, int, bytes]] = []  # a heap: when, which, what
         self._arrived = bytearray()
         for servo in self.servos:
             servo.body.time = max(servo.body.time, clock.now())
-        for trouble in troubles:
-            self.trouble(trouble)
+        for fault in faults:
+            self.inject(fault)
 
-    def trouble(self, trouble: Trouble) -> None:
+    def inject(self, fault: InjectedFault) -> None:
         """Let something go wrong."""
-        self._troubles.append(trouble)
-        self._turns.append((trouble.at, True, trouble))
-        if trouble.until < float("inf"):
-            self._turns.append((trouble.until, False, trouble))
+        self._faults.append(fault)
+        self._turns.append((fault.at, True, fault))
+        if fault.until < float("inf"):
+            self._turns.append((fault.until, False, fault))
         self._turns.sort(key=lambda turn: turn[0])
 
     def servo(self, id: int) -> VirtualServo:
@@ -170,18 +170,18 @@ class VirtualBus:
 
     def _obey(self, packet: Packet, time: float) -> float:
         """Let the servos concerned carry out a packet; returns when the line is free again."""
-        told: list[tuple[VirtualServo, Command]] = []
+        requests: list[tuple[VirtualServo, Request]] = []
         tolerated = _SAME_RATE * self.baudrate
         for servo in self.servos:
             if packet.id not in (servo.id, BROADCAST) or abs(servo.baud - self.baudrate) > tolerated:
                 continue
             command = self._codec.command_for(packet, servo.id)
             if command is not None:
-                told.append((servo, command))
-        told.sort(key=lambda pair: len(pair[1].after))
+                requests.append((servo, command))
+        requests.sort(key=lambda pair: len(pair[1].after))
         said: set[int] = set()
-        for id in dict.fromkeys(servo.id for servo, _ in told):
-            mine = [pair for pair in told if pair[0].id == id]
+        for id in dict.fromkeys(servo.id for servo, _ in requests):
+            mine = [pair for pair in requests if pair[0].id == id]
             before = mine[0][1].after
             answers = [self._answer(servo, command, time) for servo, command in mine]
             if before and mine[0][1].kind == "read" and before[-1] not in said:
@@ -191,11 +191,11 @@ class VirtualBus:
                 said.add(id)
         return time
 
-    def _answer(self, servo: VirtualServo, command: Command, time: float) -> tuple[float, bytes] | None:
+    def _answer(self, servo: VirtualServo, command: Request, time: float) -> tuple[float, bytes] | None:
         """What a servo answers: its return delay, and the bytes."""
         id = servo.id  # the command may change it
         self._live_through(time)
-        if deafened(self._troubles, id, time, self._random):
+        if deafened(self._faults, id, time, self._random):
             return None
         if self._witness is not None:
             self._witness(time, id, command)
@@ -212,7 +212,7 @@ class VirtualBus:
         for _, other in answers[1:]:
             both = zip(data.ljust(len(other), b"\xff"), other.ljust(len(data), b"\xff"), strict=True)
             data = bytes(a & b for a, b in both)
-        late, data = suffered(self._troubles, id, time, data, self._random)
+        late, data = affected(self._faults, id, time, data, self._random)
         self.answers += 1
         begin = time + late + min(delay for delay, _ in answers)
         end = begin + len(data) * self._byte_time
@@ -235,14 +235,14 @@ class VirtualBus:
             raise OSError(errno.EIO, "the cable of the virtual bus was pulled")
 
     def _live_through(self, time: float) -> None:
-        """Let the troubles up to a time begin and end."""
+        """Let the faults up to a time begin and end."""
         while self._turns and self._turns[0][0] <= time:
-            at, begins, trouble = self._turns.pop(0)
-            if trouble.kind == "pulled":
+            at, begins, fault = self._turns.pop(0)
+            if fault.kind == "pulled":
                 self.pulled = True
-            if trouble.kind not in _SERVOS_OWN:
+            if fault.kind not in _SERVOS_OWN:
                 continue
             for servo in self.servos:
-                if trouble.id in (None, servo.id):
+                if fault.id in (None, servo.id):
                     servo.advance(at)
-                    (trouble.begin if begins else trouble.end)(servo)
+                    (fault.begin if begins else fault.end)(servo)

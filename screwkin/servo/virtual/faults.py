@@ -1,4 +1,4 @@
-"""What can go wrong on a virtual bus, told beforehand: troubles of answers, of servos, and of the cable."""
+"""Faults injected into a virtual bus: of answers, of servos, and of the cable."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ _MOST_NOISE = 12  # bytes
 
 
 @dataclass(frozen=True)
-class Trouble:
+class InjectedFault:
     """Something that goes wrong from ``at`` to ``until`` [s of the bus's clock].
 
     ``deaf``: commands do not reach the servo. ``dropped``, ``corrupted``, ``truncated``, ``late`` (0.2 s),
     ``noise`` (bytes before it): of answers. ``reset``: the servo starts anew. ``overload``: twice the stall
     torque on it. ``overheat``: 10 degrees above its limit. ``brown-out``: ``volts`` for it. ``pulled``: the
     port is gone for good. ``id`` is the servo concerned, None all; ``share`` is how many of the answers or
-    commands concerned suffer.
+    commands concerned are affected.
     """
 
     kind: Kind
@@ -51,16 +51,16 @@ class Trouble:
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
-            raise InputError(f"unknown trouble {self.kind!r}; valid: {', '.join(KINDS)}")
+            raise InputError(f"unknown fault {self.kind!r}; valid: {', '.join(KINDS)}")
         if not (self.at <= self.until and 0 <= self.share <= 1):
             raise InputError(f"{self}: needs at <= until, and a share from 0 to 1")
 
     def concerns(self, id: int, time: float) -> bool:
-        """Whether a servo suffers from it at a time."""
+        """Whether it affects a servo at a time."""
         return self.at <= time < self.until and self.id in (None, id)
 
     def begin(self, servo: VirtualServo) -> None:
-        """Do to a servo what this trouble does to it."""
+        """Inject it into a servo."""
         body = servo.body
         if self.kind == "reset":
             servo.reset(self.at)
@@ -82,33 +82,33 @@ class Trouble:
             body.voltage = servo.profile.voltage
 
 
-def suffered(
-    troubles: Sequence[Trouble], id: int, time: float, answer: bytes, random: np.random.Generator
+def affected(
+    faults: Sequence[InjectedFault], id: int, time: float, answer: bytes, random: np.random.Generator
 ) -> tuple[float, bytes]:
     """What becomes of an answer: how much later it comes [s], and its bytes."""
     delay = 0.0
-    for trouble in troubles:
-        if not trouble.concerns(id, time) or (trouble.share < 1 and random.random() >= trouble.share):
+    for fault in faults:
+        if not fault.concerns(id, time) or (fault.share < 1 and random.random() >= fault.share):
             continue
-        if trouble.kind == "dropped":
+        if fault.kind == "dropped":
             answer = b""
-        elif trouble.kind == "late":
+        elif fault.kind == "late":
             delay += _LATE
-        elif trouble.kind == "corrupted" and answer:
+        elif fault.kind == "corrupted" and answer:
             place, flip = int(random.integers(len(answer))), int(random.integers(1, 256))
             answer = answer[:place] + bytes((answer[place] ^ flip,)) + answer[place + 1 :]
-        elif trouble.kind == "truncated":
+        elif fault.kind == "truncated":
             answer = answer[: int(random.integers(len(answer)))] if answer else answer
-        elif trouble.kind == "noise":
+        elif fault.kind == "noise":
             answer = random.bytes(int(random.integers(1, _MOST_NOISE + 1))) + answer
     return delay, answer
 
 
-def deafened(troubles: Sequence[Trouble], id: int, time: float, random: np.random.Generator) -> bool:
+def deafened(faults: Sequence[InjectedFault], id: int, time: float, random: np.random.Generator) -> bool:
     """Whether a command does not reach a servo."""
     return any(
-        trouble.kind == "deaf"
-        and trouble.concerns(id, time)
-        and (trouble.share == 1 or random.random() < trouble.share)
-        for trouble in troubles
+        fault.kind == "deaf"
+        and fault.concerns(id, time)
+        and (fault.share == 1 or random.random() < fault.share)
+        for fault in faults
     )

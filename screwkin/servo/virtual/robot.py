@@ -43,7 +43,7 @@ def virtual_servos(
     springs = [math.inf] * len(q)
     if stiffness is not None or "stiffness" in robot.servos:
         springs = joint_stiffness(robot, stiffness).tolist()
-    made = []
+    virtual = []
     for servo, angle, spring in zip(servos.joints, q, springs, strict=True):
         servo.ticks_from_angle(angle)  # refused if it cannot stand there
         one = VirtualServo(
@@ -51,5 +51,5 @@ def virtual_servos(
         )
         for name, value in (changed or {}).items():
             one.put(name, int(value))
-        made.append(one)
-    return made
+        virtual.append(one)
+    return virtual

@@ -1,6 +1,6 @@
-"""A virtual servo: a register table with a body behind it, that answers commands as the makers' manuals tell.
+"""A virtual servo: a register table with a body behind it, that answers commands as the makers' manuals say.
 
-What the manuals tell and software stumbles over is there: writing a goal switches torque on (protocol 1.0),
+What the manuals say and software stumbles over is there: writing a goal switches torque on (protocol 1.0),
 the lasting part of the table is locked while torque is on (2.0), a goal beyond the angle limits is refused,
 an alarm named in ``shutdown`` takes the torque away until it is switched on again, a reset forgets the rest.
 """
@@ -8,20 +8,23 @@ an alarm named in ``shutdown`` takes the torque away until it is switched on aga
 from __future__ import annotations
 
 import math
-from typing import Literal
 
-from screwkin.servo.packets import Command
-from screwkin.servo.profiles import Profile, Register, baud_from_register, decode, encode, register_from_baud
+from screwkin.servo.packets import Request, RequestOutcome
+from screwkin.servo.profiles import (
+    Profile,
+    Register,
+    baud_from_register,
+    decode,
+    encode,
+    radians_from_ticks,
+    register_from_baud,
+)
+from screwkin.servo.protocols import codec
 from screwkin.servo.virtual.body import OVERHEAT, OVERLOAD, VOLTAGE, Body
-
-Outcome = Literal["done", "angle", "limit", "range", "access", "instruction"]
 
 BOOT = 0.2
 """How long a servo is silent after a reset [s]."""
 
-_BITS = {"done": 0, "angle": 0x02, "limit": 0x08, "range": 0x08, "access": 0x08, "instruction": 0x40}
-_NUMBERS = {"done": 0, "angle": 6, "limit": 6, "range": 4, "access": 7, "instruction": 2}
-_ALERT = 0x80
 _LEAST_VOLTAGE = 4.0  # V, below which nothing runs
 _LEVELS = {"ping": 0, "read": 1}  # status level from which on a command is answered; others at 2
 
@@ -48,6 +51,8 @@ class VirtualServo:
         return_delay: float = 0.0,
     ) -> None:
         self.profile = profile
+        self._codec = codec(profile.protocol)
+        self._facts = self._codec.FACTS
         self.body = Body(profile.stall_torque, profile.voltage, angle, stiffness)
         self.table = bytearray(profile.size)
         self._id_at = profile.register("id").address
@@ -107,9 +112,9 @@ class VirtualServo:
             return
         profile, goal = self.profile, None
         if self.torque_on:
-            goal = (self.get("goal_position") - profile.centre) * profile.tick
-        told, most = self.get("moving_speed"), profile.no_load_speed * self.body.voltage / profile.voltage
-        speed = min(told * profile.speed_unit, most) if told else most
+            goal = radians_from_ticks(profile, self.get("goal_position"))
+        wanted, most = self.get("moving_speed"), profile.no_load_speed * self.body.voltage / profile.voltage
+        speed = min(wanted * profile.speed_unit, most) if wanted else most
         limit = self.profile.register("torque_limit")
         torque = self.get("torque_limit") / limit.high
         if self.body.voltage < _LEAST_VOLTAGE or torque == 0:
@@ -119,18 +124,18 @@ class VirtualServo:
             self._alarms |= cause  # a shutdown lasts until torque is switched on again
             self.put("torque_enable", 0)
 
-    def reset(self, time: float, keep: int | None = None) -> None:
-        """Start anew at a time: the table above ``keep`` forgets (default: what power does not keep)."""
+    def reset(self, time: float, begin: int | None = None) -> None:
+        """Start anew at a time, with registers from address ``begin`` on as new (default: volatile ones)."""
         self.advance(time)
-        begin = self.profile.ram_begins if keep is None else keep
+        first = self.profile.ram_begins if begin is None else begin
         for register in self.profile.registers.values():
-            if register.address >= begin:
+            if register.address >= first:
                 self._put(register, register.initial)
         self._registered, self._alarms, self.body.overloaded = None, 0, 0.0
         self._hold_still()
         self.silent_until = time + BOOT
 
-    def answer(self, command: Command, time: float) -> tuple[int, bytes] | None:
+    def answer(self, command: Request, time: float) -> tuple[int, bytes] | None:
         """Carry out a command at a time [s]; error byte and data to answer, None for silence."""
         if time < self.silent_until or self.body.voltage < _LEAST_VOLTAGE:
             return None
@@ -138,17 +143,12 @@ class VirtualServo:
         outcome, data = self._carry_out(command, time)
         if not command.answers or self.get("status_level") < _LEVELS.get(command.kind, 2):
             return None
-        return self._error(outcome), data
+        return self._codec.error_byte(outcome, self.alarms), data
 
-    def _error(self, outcome: Outcome) -> int:
-        if self.profile.protocol == 1.0:
-            return self.alarms | _BITS[outcome]
-        return (_ALERT if self.alarms else 0) | _NUMBERS[outcome]
-
-    def _carry_out(self, command: Command, time: float) -> tuple[Outcome, bytes]:
+    def _carry_out(self, command: Request, time: float) -> tuple[RequestOutcome, bytes]:
         match command.kind:
             case "ping":
-                return "done", self._who() if self.profile.protocol == 2.0 else b""
+                return "done", self._who() if self._facts.ping_names_model else b""
             case "read":
                 return self._read(command.address, command.length)
             case "write":
@@ -161,7 +161,7 @@ class VirtualServo:
                 self.put("registered", 0)
                 return self._write(address, data), b""
             case "factory reset":
-                whole = self.profile.protocol == 1.0 or command.data == b"\xff"
+                whole = not self._facts.partial_reset or command.data == b"\xff"
                 lasting = self.profile.register("return_delay").address
                 self.reset(time, 0 if whole else lasting)
                 return "done", b""
@@ -173,36 +173,36 @@ class VirtualServo:
     def _who(self) -> bytes:
         return self.get("model_number").to_bytes(2, "little") + bytes((self.get("firmware"),))
 
-    def _read(self, address: int, length: int) -> tuple[Outcome, bytes]:
+    def _read(self, address: int, length: int) -> tuple[RequestOutcome, bytes]:
         if not 0 < length <= len(self.table) - address:
             return "range", b""
         self._refresh()
         return "done", bytes(self.table[address : address + length])
 
-    def _register(self, address: int, data: bytes) -> Outcome:
+    def _register(self, address: int, data: bytes) -> RequestOutcome:
         outcome = self._check(address, data)
         if outcome == "done":
             self._registered = (address, data)
             self.put("registered", 1)
         return outcome
 
-    def _write(self, address: int, data: bytes) -> Outcome:
+    def _write(self, address: int, data: bytes) -> RequestOutcome:
         """Write all of the data or, where any of it is refused, nothing."""
         outcome = self._check(address, data)
         if outcome != "done":
             return outcome
         torque = self.torque_on
         self.table[address : address + len(data)] = data
-        goal, first = self.profile.register("goal_position"), self.profile.protocol == 1.0
-        if first and address < goal.end and goal.address < address + len(data) and not self._alarms:
+        goal, waking = self.profile.register("goal_position"), self._facts.goal_switches_torque_on
+        if waking and address < goal.end and goal.address < address + len(data) and not self._alarms:
             self.put("torque_enable", 1)
         if self.torque_on and not torque:
             self._alarms = 0
-            if not first:
+            if not waking:
                 self._hold_still()
         return "done"
 
-    def _check(self, address: int, data: bytes) -> Outcome:
+    def _check(self, address: int, data: bytes) -> RequestOutcome:
         if address + len(data) > len(self.table):
             return "range"
         after = bytearray(self.table)
@@ -216,10 +216,9 @@ class VirtualServo:
                 return outcome
         return "done"
 
-    def _check_one(self, register: Register, value: int) -> Outcome:
-        locked = (
-            self.profile.protocol == 2.0 and self.torque_on and register.address < self.profile.ram_begins
-        )
+    def _check_one(self, register: Register, value: int) -> RequestOutcome:
+        lasting = register.address < self.profile.ram_begins
+        locked = lasting and self.torque_on and self._facts.locked_while_stiff
         if register.access == "r" or locked:
             return "access"
         if register.name == "goal_position":

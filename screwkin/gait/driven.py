@@ -1,0 +1,122 @@
+"""Which joints a gait drives: those with which legs follow poses and arms follow their hands.
+
+A joint that moves no limb, or more than one, rests at its ``home`` position, and so does the surplus of a
+limb with more joints than its target asks for. The others then follow from base and tips alone, at every
+sample, and their rates are the slopes of their positions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.screws import at
+from screwkin.algebra.se3 import as_array
+from screwkin.gait.held import with_held_joints
+from screwkin.gait.stance import Stance
+from screwkin.kinematics.positions import chain_jacobian, successive_displacement
+from screwkin.model.robot import Limb, Robot
+
+POSE, POSITION = 6, 3
+"""Joints with which a limb follows a pose, and a position."""
+_AROUND = 0.3
+"""How far from home, joint by joint, the choice of a limb's joints looks [rad or m]."""
+_EQUAL = 1e-6
+"""Relative difference below which two choices are equally good; the joints nearer to the base win."""
+
+
+@dataclass(frozen=True, eq=False)
+class Driven:
+    """A robot and what a gait drives of it.
+
+    Attributes:
+        robot: the whole robot.
+        moving: the robot without its held joints and without the limbs that rest; itself if there are none.
+        joints: indices of the moving joints among the robot's.
+        home: q (n,) of the whole robot at home [rad or m].
+        resting: names of the limbs that follow no target.
+    """
+
+    robot: Robot
+    moving: Robot
+    joints: tuple[int, ...]
+    home: Array
+    resting: tuple[str, ...]
+
+    def positions(self, q: Array) -> Array:
+        """Joint positions (T, n) of the whole robot from those of the moving joints (T, m)."""
+        whole = np.tile(self.home, (len(q), 1))
+        whole[:, self.joints] = q
+        return whole
+
+    def rates(self, qd: Array) -> Array:
+        """Rates or accelerations (T, n) of the whole robot from those of the moving joints (T, m)."""
+        whole = np.zeros((len(qd), len(self.home)))
+        whole[:, self.joints] = qd
+        return whole
+
+    def stance(self, stance: Stance) -> Stance:
+        """The stance without hands that rest."""
+        return replace(stance, hands=tuple(h for h in stance.hands if h.name in self.moving.tip_names))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the reader of a walk should know of limbs that rest."""
+        few = f"rests: fewer than {POSITION} joints of its own cannot lead its tip"
+        return tuple(f"{name} {few}" for name in self.resting)
+
+
+def driven(robot: Robot) -> Driven:
+    """What a gait drives of a robot with a ``home`` posture.
+
+    Legs follow poses with up to six joints of their own. Arms follow poses with six joints, positions with
+    three; with fewer than three they rest. A robot with closures is driven as a whole.
+
+    Args:
+        robot: with a ``home`` posture.
+    """
+    home = np.array(robot.posture("home").q, dtype=float)
+    if robot.closures:
+        return Driven(robot, robot, tuple(range(len(home))), home, ())
+    chosen = {limb.name: _chosen(robot, limb, home) for limb in robot.limbs}
+    moving = {i for joints in chosen.values() for i in joints}
+    rest = {joint.name: float(home[i]) for i, joint in enumerate(robot.joints) if i not in moving}
+    resting = tuple(limb.name for limb in robot.limbs if not chosen[limb.name])
+    reduced = with_held_joints(robot, rest)
+    if resting:
+        limbs = tuple(limb for limb in reduced.limbs if limb.name not in resting)
+        reduced = replace(reduced, limbs=limbs)
+    return Driven(robot, reduced, tuple(sorted(moving)), home, resting)
+
+
+def _chosen(robot: Robot, limb: Limb, home: Array) -> tuple[int, ...]:
+    """Indices of a limb's joints that move, from the base on."""
+    others = {i for other in robot.limbs if other.name != limb.name for i in robot.path_to(other.link)}
+    own = [i for i in robot.path_to(limb.link) if i not in others]
+    if limb.kind == "leg":
+        count = min(POSE, len(own))
+    else:
+        count = next((n for n in (POSE, POSITION) if n <= len(own)), 0)
+    return tuple(own) if count == len(own) else _best(robot, limb, own, count, home)
+
+
+def _best(robot: Robot, limb: Limb, own: Sequence[int], count: int, home: Array) -> tuple[int, ...]:
+    """The ``count`` joints that move a tip best: largest volume of their columns, at home and around it."""
+    if not count:
+        return ()
+    path, rows = robot.path_to(limb.link), slice(0, 6) if count == POSE else slice(3, 6)
+    screws = [robot.joints[i].screw for i in path]
+    offsets = [np.zeros(len(path)), *(s * _AROUND * e for e in np.eye(len(path)) for s in (1, -1))]
+    total = dict.fromkeys(combinations(own, count), 0.0)
+    for offset in offsets:
+        thetas = list(home[list(path)] + offset)
+        tip = successive_displacement(screws, thetas, A_ref_k=limb.frame).p
+        columns = [as_array(at(tip, column)).astype(float)[rows] for column in chain_jacobian(screws, thetas)]
+        for choice in total:
+            total[choice] += abs(np.linalg.det(np.stack([columns[path.index(i)] for i in choice])))
+    best = max(total.values())
+    return next(choice for choice, volume in total.items() if volume >= (1 - _EQUAL) * best)

@@ -1,0 +1,87 @@
+"""A robot with some of its joints held: the same bodies with fewer joints between them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.screws import carry, displacement
+from screwkin.algebra.se3 import IDENTITY, Pose, Vector, as_array
+from screwkin.errors import InputError
+from screwkin.model.robot import Inertia, Joint, Limb, Link, Robot, Sole
+
+
+def with_held_joints(robot: Robot, positions: Mapping[str, float]) -> Robot:
+    """The robot whose named joints are held: their links become one body with the links they stand on.
+
+    The zero pose of what is left is the one in which the held joints stand where they are held, so joint
+    positions, tips and the motion of every body stay what they are. Boxes, which contact alone needs, and
+    the table's text are left out.
+
+    Args:
+        robot: without closures.
+        positions: of the held joints by name [rad or m].
+
+    Raises:
+        UnknownNameError: no such joint. InputError: the robot has closures.
+    """
+    if not positions:
+        return robot
+    if robot.closures:
+        raise InputError(f"{robot.name} has closures; its joints cannot be held one by one")
+    for name in positions:
+        robot.joint(name)
+    moved, body = {robot.base_link: IDENTITY}, {robot.base_link: robot.base_link}
+    for i in robot.traversal:
+        joint = robot.joints[i]
+        at = positions.get(joint.name)
+        before = moved[joint.parent]
+        moved[joint.child] = before if at is None else before @ displacement(joint.screw, at)
+        body[joint.child] = joint.child if at is None else body[joint.parent]
+
+    def joint_of(joint: Joint) -> Joint:
+        return replace(joint, parent=body[joint.parent], screw=carry(moved[joint.parent], joint.screw))
+
+    def limb_of(limb: Limb) -> Limb:
+        return replace(limb, link=body[limb.link], frame=moved[limb.link] @ limb.frame)
+
+    def sole_of(sole: Sole) -> Sole:
+        T = moved[robot.limb(sole.limb).link]
+        return replace(sole, corners=tuple(T @ corner for corner in sole.corners))
+
+    left = [i for i, joint in enumerate(robot.joints) if joint.name not in positions]
+    return replace(
+        robot,
+        links=tuple(_body(robot, name, body, moved) for name in robot.link_names if body[name] == name),
+        joints=tuple(joint_of(robot.joints[i]) for i in left),
+        limbs=tuple(map(limb_of, robot.limbs)),
+        soles=tuple(map(sole_of, robot.soles)),
+        postures=tuple(replace(p, q=tuple(p.q[i] for i in left)) for p in robot.postures),
+        text="",
+    )
+
+
+def _body(robot: Robot, name: str, body: Mapping[str, str], moved: Mapping[str, Pose]) -> Link:
+    """A link together with all that is held to it."""
+    parts = [link for link in robot.links if body[link.name] == name]
+    own = robot.link(name)
+    frame, mass = moved[name] @ own.frame, float(sum(part.mass for part in parts))
+    if mass == 0:
+        return replace(own, com=moved[name] @ own.com, frame=frame, boxes=())
+    masses = [float(part.mass) for part in parts]
+    places = [as_array(moved[part.name] @ part.com).astype(float) for part in parts]
+    com = np.average(places, axis=0, weights=masses)
+    total = np.zeros((3, 3))
+    for part, m, place in zip(parts, masses, places, strict=True):
+        arm, R = place - com, as_array(moved[part.name].R).astype(float)
+        total += R @ _matrix(part.inertia) @ R.T + m * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = total.tolist()
+    inertia = Inertia(xx, yy, zz, xy, xz, yz)
+    return replace(own, mass=mass, com=Vector(*com.tolist()), inertia=inertia, frame=frame, boxes=())
+
+
+def _matrix(i: Inertia) -> Array:
+    return np.array([[i.xx, i.xy, i.xz], [i.xy, i.yy, i.yz], [i.xz, i.yz, i.zz]], dtype=float)

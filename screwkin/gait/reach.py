@@ -1,0 +1,114 @@
+"""Why a robot cannot follow a plan: the freedom that a limb has not, or the key of the gait to change."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.screws import at
+from screwkin.algebra.se3 import Pose, as_array, pose_from_array, rotation_log, unstack
+from screwkin.errors import LimitError, UnreachableError
+from screwkin.gait.plan import Plan
+from screwkin.ik.pose_solution import PoseSolution
+from screwkin.kinematics.landmarks import limb_root, waist_frame
+from screwkin.kinematics.positions import (
+    chain_jacobian,
+    frame_pose,
+    link_displacements,
+    successive_displacement,
+)
+from screwkin.model.robot import Limb, Robot
+
+_MISSING = 1e-6
+"""Singular value, relative to the largest, below which a limb cannot move its tip in a direction."""
+_FREEDOMS = (
+    ("turns", "about the direction of walking"),
+    ("turns", "about the sideways axis"),
+    ("turns", "about the vertical"),
+    ("moves", "forwards"),
+    ("moves", "sideways"),
+    ("moves", "up and down"),
+)
+
+
+def refuse_unreachable(
+    robot: Robot, plan: Plan, targets: Mapping[str, Array], solution: PoseSolution
+) -> None:
+    """Raise for the first sample that a robot cannot follow.
+
+    Args:
+        robot: the robot.
+        plan: what it is to follow.
+        targets: world poses (T, 4, 4) or positions (T, 3) of the tips, by name.
+        solution: of these targets.
+
+    Raises:
+        UnreachableError, SingularError, LimitError: name limb, sample and time, and what to change.
+    """
+    try:
+        solution.raise_on_failure(robot, plan.time)
+    except (UnreachableError, LimitError) as error:
+        limb, sample = robot.limb(error.limb), error.sample
+        missing = _missing_freedom(robot, limb, targets[limb.tip][sample], solution, sample)
+        when = f"{limb.name}, sample {sample} (t = {float(plan.time[sample]):.3f} s)"
+        if missing:
+            raise UnreachableError(f"{when}: {missing}; {_other_gait(plan)}", limb.name, sample) from None
+        error.args = (f"{error}. {_advice(robot, plan, limb)}",)
+        raise
+
+
+def _missing_freedom(robot: Robot, limb: Limb, target: Array, solution: PoseSolution, sample: int) -> str:
+    """What no joint of a limb does although the target asks for it; empty if that is not the reason."""
+    path = robot.path_to(limb.link)
+    if target.shape != (4, 4):
+        return ""
+    screws, home = [robot.joints[i].screw for i in path], [robot.posture("home").q[i] for i in path]
+    waist = waist_frame(robot)
+    tip = successive_displacement(screws, home, A_ref_k=limb.frame)
+    length = max(float(np.linalg.norm(as_array(tip.p - limb_root(robot, limb.name)).astype(float))), 1e-3)
+    axes = np.kron(np.eye(2), as_array(waist.R).astype(float).T)
+    weight = np.repeat([1.0, 1 / length], 3)
+    columns = [as_array(at(tip.p, column)).astype(float) for column in chain_jacobian(screws, home)]
+    J = weight[:, None] * (axes @ np.stack(columns, axis=1))
+    U, values, _ = np.linalg.svd(J)
+    free = U[:, int((values > _MISSING * values[0]).sum()) :]
+    residual = weight * _residual(robot, limb, target, solution, sample, waist)
+    asked = free.T @ residual
+    if not np.linalg.norm(asked) > 0.5 * np.linalg.norm(residual):
+        return ""
+    verb, how = _FREEDOMS[int(np.abs(free @ asked).argmax())]
+    joints = ", ".join(robot.joints[i].name for i in path)
+    return f"no joint of {limb.name} ({joints}) {verb} {limb.tip} {how}, as the gait asks"
+
+
+def _residual(
+    robot: Robot, limb: Limb, target: Array, solution: PoseSolution, sample: int, waist: Pose
+) -> Array:
+    """From the tip to its target (6,): rotation vector and translation in waist axes [rad and m]."""
+    q = np.reshape(solution.state.q, (-1, len(robot.joints)))[sample]
+    T = pose_from_array(np.reshape(solution.state.T_world_base, (-1, 4, 4))[sample])
+    D = link_displacements(robot, unstack(q))
+    tip, wanted = frame_pose(robot, D, limb.tip), T.inverse @ pose_from_array(target)
+    turn, gap = rotation_log(wanted.R @ tip.R.T), wanted.p - tip.p
+    return np.concatenate([as_array(waist.R.T @ v).astype(float) for v in (turn, gap)])
+
+
+def _other_gait(plan: Plan) -> str:
+    if plan.gait.turn:
+        return f"set turn = 0 (now {plan.gait.turn:.3g} rad), or choose a gait that goes straight or sideways"
+    return f"choose another gait than {plan.gait.name}"
+
+
+def _advice(robot: Robot, plan: Plan, limb: Limb) -> str:
+    """Keys of the gait that bring a limb's targets nearer, with their values now and at home."""
+    gait, back = plan.gait, waist_frame(robot).inverse
+    D = link_displacements(robot, list(robot.posture("home").q))
+    tip = (back @ frame_pose(robot, D, limb.tip)).p
+    if limb.kind != "leg":
+        drop = float((back @ limb_root(robot, limb.name)).z - tip.z)
+        return f"Set hand_drop (now {gait.hand_drop:g} m) nearer to that at home, {drop:.3g} m"
+    height = f"Set waist_height (now {gait.waist_height:g} m) nearer to that at home, {-float(tip.z):.3g} m"
+    moved = [f"{key} ({getattr(gait, key):g})" for key in ("stride", "side", "turn") if getattr(gait, key)]
+    return f"{height}, or bring {', '.join([*moved, f'lift ({gait.lift:g})'])} nearer to 0"

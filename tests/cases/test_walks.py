@@ -1,0 +1,85 @@
+"""Walks of robots that are the Bioloid described otherwise, or have other joints than it."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import screwkin as sk
+from screwkin.algebra.se3 import UNTURNED, Pose, Vector
+from screwkin.errors import LimitError, UnreachableError
+from screwkin.model.library import gait_names
+from screwkin.model.robot import Robot
+from screwkin.model.table import parse_robot
+from tests.cases.tables import AXIS_POINTS, BIOLOID, LONG_LEGS, NECK, WAIST_JOINT, WITHOUT_YAW
+from tests.laws.descriptions import seen_from
+from tests.laws.test_geometry import assert_same_walk
+
+GAITS = [name for name in gait_names() if "poppy" not in name]
+
+
+@cache
+def robot_of(text: str) -> Robot:
+    return parse_robot(text)
+
+
+@cache
+def walked(text: str, gait: str) -> sk.Trajectory:
+    return sk.walk(robot_of(text), sk.load_gait(gait).replace(rate=10), 2)
+
+
+@pytest.mark.parametrize("gait", GAITS)
+@pytest.mark.parametrize("case", AXIS_POINTS)
+def test_other_points_of_the_axes_walk_the_same(case: str, gait: str) -> None:
+    assert_same_walk(walked(AXIS_POINTS[case], gait), walked(BIOLOID, gait))
+
+
+@pytest.mark.parametrize("gait", GAITS)
+def test_a_base_frame_at_the_chest_walks_the_same(gait: str) -> None:
+    robot = seen_from(robot_of(BIOLOID), Pose(UNTURNED, Vector(0.02, 0.0, 0.12)))
+    moved = sk.walk(robot, sk.load_gait(gait).replace(rate=10), 2)
+    assert_same_walk(moved, walked(BIOLOID, gait))
+    height = moved.T_world_base[:, 2, 3] - walked(BIOLOID, gait).T_world_base[:, 2, 3]
+    np.testing.assert_allclose(height, 0.12, atol=1e-12)
+
+
+@pytest.mark.parametrize("gait", GAITS)
+def test_a_neck_rests_and_nothing_else_changes(gait: str) -> None:
+    necked = walked(NECK, gait)
+    assert not necked.qd[:, 0].any()
+    np.testing.assert_array_equal(necked.q[:, 0], 0.0)
+    if gait != "preview":  # which leads the CoM, of the head too
+        np.testing.assert_allclose(necked.q[:, 1:], walked(BIOLOID, gait).q, atol=1e-12)
+
+
+@pytest.mark.parametrize("gait", GAITS)
+def test_a_joint_below_both_arms_rests(gait: str) -> None:
+    waisted = walked(WAIST_JOINT, gait)
+    np.testing.assert_array_equal(waisted.q[:, 0], 0.0)
+    assert waisted.margin.min() > 0.004
+
+
+def test_legs_without_yaw_walk_straight_and_sideways_and_name_what_they_lack_in_a_turn() -> None:
+    for gait in ("walk", "sideways"):
+        assert walked(WITHOUT_YAW, gait).margin.min() > 0
+    lacks = r"no joint of right_leg \(right_hip_roll, .*\) turns right_foot about the vertical.* set turn = 0"
+    with pytest.raises(UnreachableError, match=lacks):
+        walked(WITHOUT_YAW, "turn")
+
+
+def test_a_gait_that_stoops_too_low_names_the_key_to_change() -> None:
+    key = r"right_knee at .*\. Set waist_height \(now 0\.15 m\) nearer to that at home, 0\.255 m"
+    with pytest.raises(LimitError, match=key):
+        walked(LONG_LEGS, "walk")
+    higher = sk.load_gait("walk").replace(rate=10, waist_height=0.23)
+    assert sk.walk(robot_of(LONG_LEGS), higher, 2).samples > 2
+
+
+def test_hands_out_of_reach_name_their_key() -> None:
+    low = sk.load_gait("walk").replace(rate=10, hand_drop=0.3)
+    with pytest.raises(
+        UnreachableError, match=r"Set hand_drop \(now 0\.3 m\) nearer to that at home, 0\.113 m"
+    ):
+        sk.walk(robot_of(BIOLOID), low, 2)

@@ -1,0 +1,110 @@
+"""What a gait drives: limbs with more or fewer joints than their targets ask for, joints shared or idle."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import screwkin as sk
+from screwkin.algebra.se3 import UNTURNED, Pose, Vector
+from screwkin.errors import InputError, UnknownNameError
+from screwkin.gait.driven import driven
+from screwkin.gait.held import with_held_joints
+from screwkin.model.robot import Inertia, Link, Robot
+from screwkin.model.table import parse_robot
+from tests.cases.tables import NECK, WAIST_JOINT
+from tests.laws.descriptions import mirrored
+
+
+def with_arm_yaw(robot: Robot) -> Robot:
+    """One more joint in each arm, about the upper arm, before the elbow."""
+    joints, links, q = list(robot.joints), list(robot.links), list(robot.posture("home").q)
+    for side in ("right", "left"):
+        elbow = robot.joint(f"{side}_elbow")
+        place = Pose(UNTURNED, elbow.screw.s0)
+        links.append(Link(f"{side}_upper", 0, place.p, Inertia(0, 0, 0), place))
+        yaw = replace(
+            elbow,
+            name=f"{side}_arm_yaw",
+            child=f"{side}_upper",
+            screw=replace(elbow.screw, s=Vector(0, 0, 1.0 if side == "left" else -1.0)),
+        )
+        joints[joints.index(elbow)] = replace(elbow, parent=f"{side}_upper")
+        joints.append(yaw)
+        q.append(0.0)
+    return replace(
+        robot,
+        links=tuple(links),
+        joints=tuple(joints),
+        postures=(replace(robot.posture("home"), q=tuple(q)),),
+    )
+
+
+@pytest.mark.parametrize("name", ["bioloid", "bioloid24"])
+def test_bodies_of_a_robot_with_held_joints_are_where_they_are_without_holding(name: str) -> None:
+    robot = sk.load_robot(name)
+    rng = np.random.default_rng(1)
+    q, names = rng.uniform(-1, 1, len(robot.joints)), ("right_hip_pitch", "left_elbow", "right_shoulder_roll")
+    less = with_held_joints(robot, {n: q[robot.joint_names.index(n)] for n in names})
+    left = [i for i, n in enumerate(robot.joint_names) if n not in names]
+    one, two = sk.State(np.eye(4), q), sk.State(np.eye(4), q[left])
+    for frame in (*robot.tip_names, *less.link_names):
+        np.testing.assert_allclose(
+            sk.frame_pose(less, two, frame), sk.frame_pose(robot, one, frame), atol=1e-14
+        )
+    np.testing.assert_allclose(sk.center_of_mass(less, two), sk.center_of_mass(robot, one), atol=1e-14)
+    kept = [*range(6), *(6 + i for i in left)]
+    M = sk.mass_matrix(robot, one)[np.ix_(kept, kept)]
+    np.testing.assert_allclose(sk.mass_matrix(less, two), M, atol=1e-14)
+
+
+def test_a_robot_whose_joints_all_follow_is_driven_as_it_is() -> None:
+    for name in ("bioloid", "bioloid24", "poppy12"):
+        robot = sk.load_robot(name)
+        assert driven(robot).moving is robot
+
+
+@pytest.mark.parametrize(("text", "rests"), [(NECK, "neck"), (WAIST_JOINT, "waist_yaw")])
+def test_idle_and_shared_joints_rest(text: str, rests: str) -> None:
+    robot = parse_robot(text)
+    assert set(robot.joint_names) - set(driven(robot).moving.joint_names) == {rests}
+
+
+@pytest.mark.parametrize(("name", "moving"), [("bioloid", 3), ("bioloid24", 6)])
+def test_the_surplus_of_an_arm_rests_and_rates_are_slopes(name: str, moving: int) -> None:
+    robot = with_arm_yaw(sk.load_robot(name))
+    drive = driven(robot)
+    for limb in drive.moving.limbs[2:]:
+        assert len(drive.moving.path_to(limb.link)) == moving
+    walked = sk.walk(robot, sk.load_gait("walk").replace(rate=1000, Tc=0.5), steps=1)
+    h = walked.time[1] - walked.time[0]
+    slope = (walked.q[2:] - walked.q[:-2]) / (2 * h)
+    assert np.quantile(np.abs(slope - walked.qd[1:-1]), 0.95) < 1e-3
+
+
+def test_left_and_right_choose_the_same_joints() -> None:
+    robot = with_arm_yaw(sk.load_robot("bioloid"))
+    image, names = mirrored(robot)
+    chosen = {names[name][0] for name in driven(robot).moving.joint_names}
+    assert chosen == set(driven(image).moving.joint_names) == {n for n, _ in names.values() if n in chosen}
+    sides = {name.removeprefix("right_") for name in chosen if name.startswith("right")}
+    assert sides == {name.removeprefix("left_") for name in chosen if name.startswith("left")}
+
+
+def test_an_arm_of_two_joints_rests_and_the_walk_says_so() -> None:
+    short = with_held_joints(sk.load_robot("bioloid"), {"right_elbow": -0.7, "left_elbow": -0.7})
+    walked = sk.walk(short, sk.load_gait("walk").replace(rate=10), steps=2)
+    arms = [i for i, name in enumerate(walked.joint_names) if "shoulder" in name]
+    assert np.ptp(walked.q[:, arms], axis=0).max() == 0
+    assert "right_arm rests: fewer than 3 joints" in walked.meta["notes"][-2]
+
+
+def test_what_cannot_be_held_is_refused() -> None:
+    with pytest.raises(UnknownNameError, match="unknown joint 'tail'"):
+        with_held_joints(sk.load_robot("bioloid"), {"tail": 0.0})
+    with pytest.raises(InputError, match="has closures"):
+        with_held_joints(
+            sk.load_robot("linkages/four-bar"), {sk.load_robot("linkages/four-bar").joint_names[0]: 0.0}
+        )
