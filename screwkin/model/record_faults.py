@@ -39,14 +39,20 @@ _KINDS: Mapping[str, tuple[str, type]] = {
 }
 
 
-def check_records(robot: RobotRecord) -> None:
+def check_records(robot: RobotRecord) -> bool:
     """Refuse what a table of the same content would be refused for; components that are symbols pass.
+
+    Returns:
+        True if every component is known to be a number.
 
     Raises:
         TableError: lists all faults.
     """
-    if not certified(robot) and (faults := record_faults(robot)):
+    if certified(robot):
+        return True
+    if faults := record_faults(robot):
         raise TableError(robot.path or f"robot {robot.name!r}", faults)
+    return False
 
 
 def record_faults(robot: RobotRecord) -> list[Fault]:

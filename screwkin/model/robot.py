@@ -60,7 +60,8 @@ class Robot(RobotRecord):
     """
 
     def __post_init__(self) -> None:
-        check_records(self)
+        if check_records(self):
+            self.__dict__["is_symbolic"] = False
 
     @classmethod
     def from_text(cls, text: str, path: str = "<text>", symbolic: bool = False) -> Self:

@@ -78,7 +78,9 @@ def test_a_step_out_of_reach_names_limb_and_time(robot: sk.Robot) -> None:
 
 def test_limits_are_those_of_the_table(robot: sk.Robot) -> None:
     knee = float(sk.home(robot).q[robot.joint_names.index("left_knee")])
-    tight = tuple(replace(j, upper=knee + 1e-3) if j.name == "left_knee" else j for j in robot.joints)
+    tight = tuple(
+        replace(j, lower=0.0, upper=knee + 1e-3) if j.name == "left_knee" else j for j in robot.joints
+    )
     with pytest.raises(LimitError, match="left_knee at"):
         sk.walk(replace(robot, joints=tight), sk.load_gait("walk"), steps=2)
 
