@@ -14,7 +14,7 @@ from screwkin.algebra.se3 import as_array, pose_from_array, unstack
 from screwkin.errors import TableError, TrajectoryError
 from screwkin.gait.balance import Balance, zmp
 from screwkin.gait.intended import intended
-from screwkin.kinematics.positions import frame_pose, link_displacements
+from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.kinematics.status import SINGULAR
 from screwkin.mechanism.choice import closed_mechanism
 from screwkin.mechanism.least_values import least_values
@@ -50,7 +50,7 @@ class Account:
         D = link_displacements(self.robot, unstack(self.motion.q))
         errors = {}
         for tip, recorded in self.trajectory.T_world_tip.items():
-            reached = as_array(T @ frame_pose(self.robot, D, tip), (self.trajectory.samples,))
+            reached = as_array(T @ pose_in_base(self.robot, D, tip), (self.trajectory.samples,))
             gap = float(np.linalg.norm(reached[:, :3, 3] - recorded[:, :3, 3], axis=1).max())
             errors[tip] = (gap, float(_angle(reached[:, :3, :3], recorded[:, :3, :3]).max()))
         return errors

@@ -83,7 +83,7 @@ def chosen_path(program: Program, count: int) -> Way:
     return "python" if count <= PYTHON_UP_TO else "numpy"
 
 
-def prepare(program: Program) -> bool:
+def compile_program(program: Program) -> bool:
     """Compile a program: from now on ``run`` takes machine code. False where there is no compiler."""
     program.memo[_PREPARED] = machine_code(program) is not None
     return bool(program.memo[_PREPARED])

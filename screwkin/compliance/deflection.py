@@ -14,7 +14,7 @@ from screwkin.algebra.se3 import IDENTITY, NO_TWIST, Pose, Twist, Vector, rotati
 from screwkin.compiler.program import Program, Recorder, kept
 from screwkin.compiler.records import identifier, matrix, pose_input
 from screwkin.compliance.supported import Supported
-from screwkin.kinematics.positions import frame_pose, link_displacements
+from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.model.robot import Robot
 
 LEAST_PIVOT = 1e-6
@@ -75,7 +75,7 @@ def newton_step(robot: Robot, support: str) -> Program:
     T, q = pose_input(recorder, "T_world_base"), recorder.input("q", len(robot.joints))
     theta = recorder.input("theta", len(robot.joints))
     k, (gravity,) = recorder.input("stiffness", len(robot.joints)), recorder.input("gravity", 1)
-    foot = frame_pose(robot, link_displacements(robot, q), support)
+    foot = pose_in_base(robot, link_displacements(robot, q), support)
     bent = _standing(robot, support, _sum(q, theta), foot.R.T @ _up(T))
     r, norm = _residual(bent, theta, k, gravity)
     pivots, step = _eliminated(bent, k, gravity, [-x * y for x, y in zip(k, r, strict=True)])
@@ -129,7 +129,7 @@ def _standing(robot: Robot, support: str, q: Sequence[Scalar], up: Vector) -> Su
     ``up`` is the vertical in the axes of the support.
     """
     D = link_displacements(robot, q)
-    return Supported(robot, support, IDENTITY, D, frame_pose(robot, D, support).R @ up)
+    return Supported(robot, support, IDENTITY, D, pose_in_base(robot, D, support).R @ up)
 
 
 def _residual(

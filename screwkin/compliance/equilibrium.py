@@ -20,7 +20,7 @@ from screwkin.algebra.se3 import as_array, map_scalars, pose_from_array, unstack
 from screwkin.compiler.run import run
 from screwkin.compliance.deflection import linear, moved, newton_step
 from screwkin.compliance.supported import Supported
-from screwkin.kinematics.positions import frame_pose, link_displacements
+from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.model.robot import Robot
 
 SETTLED = 1e-12
@@ -66,7 +66,7 @@ class Loaded:
         """Residual -(theta + torque / k) and its slope for some samples, for ``algebra.newton``."""
         robot, q, k = self.robot, self.q[rows], self.stiffness
         T = pose_from_array(self.T_world_base[rows])
-        foot = T @ frame_pose(robot, link_displacements(robot, unstack(q)), self.support)
+        foot = T @ pose_in_base(robot, link_displacements(robot, unstack(q)), self.support)
         stand = pose_from_array(as_array(foot, (len(rows),)))
 
         def residual(theta: Array, at: Array) -> tuple[Array, Array]:

@@ -14,8 +14,8 @@ from functools import cached_property
 from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.screws import Displacement, at
 from screwkin.algebra.se3 import ZERO, Pose, Twist, Vector, Z, cross, dot
-from screwkin.kinematics.mass import center_of_mass, com_jacobian
-from screwkin.kinematics.positions import frame_pose, joint_twists, link_displacements
+from screwkin.kinematics.mass import mass_center, mass_center_velocities
+from screwkin.kinematics.positions import joint_twists, link_displacements, pose_in_base
 from screwkin.model.robot import Robot
 
 
@@ -41,7 +41,7 @@ class Supported:
     def of(cls, robot: Robot, support: str, T_world_support: Pose, q: Sequence[Scalar]) -> Supported:
         """The robot at q with its support at a pose."""
         D = link_displacements(robot, q)
-        return cls(robot, support, T_world_support @ frame_pose(robot, D, support).inverse, D)
+        return cls(robot, support, T_world_support @ pose_in_base(robot, D, support).inverse, D)
 
     @cached_property
     def stance(self) -> tuple[int, ...]:
@@ -63,11 +63,11 @@ class Supported:
 
     def pose(self, frame: str) -> Pose:
         """World pose of a frame."""
-        return self.base @ frame_pose(self.robot, self.displacements, frame)
+        return self.base @ pose_in_base(self.robot, self.displacements, frame)
 
     def jacobian(self, frame: str) -> dict[int, Twist]:
         """Joint index to the frame's twist per unit rate, at the frame's own origin; other joints: none."""
-        p = self.base.R @ frame_pose(self.robot, self.displacements, frame).p
+        p = self.base.R @ pose_in_base(self.robot, self.displacements, frame).p
         return {i: at(p, self.twists[i]) for i in self.path(self.robot.frame(frame)[0])}
 
     @cached_property
@@ -76,7 +76,7 @@ class Supported:
         turned = Pose(self.base.R, ZERO)
         D = [turned @ d for d in self.displacements]
         screws = joint_twists(self.robot, self.displacements, turned)
-        c, columns = center_of_mass(self.robot, D), com_jacobian(self.robot, D, screws)
+        c, columns = mass_center(self.robot, D), mass_center_velocities(self.robot, D, screws)
         held = [
             column - at(c, screw).v if i in self.stance else column
             for i, (column, screw) in enumerate(zip(columns, screws, strict=True))

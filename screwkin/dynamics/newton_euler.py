@@ -67,7 +67,7 @@ def link_accelerations(
     return A
 
 
-def momentum(bodies: Bodies, qd: Sequence[Scalar], base: Twist) -> Wrench:
+def total_momentum(bodies: Bodies, qd: Sequence[Scalar], base: Twist) -> Wrench:
     """Momentum of the whole robot about the base origin: [angular; linear]."""
     V = link_twists(bodies, qd, base)
     total = NO_WRENCH
@@ -100,7 +100,7 @@ def link_wrenches(
     return wrenches
 
 
-def ground_wrench(
+def required_wrench(
     bodies: Bodies,
     qd: Sequence[Scalar],
     qdd: Sequence[Scalar],
@@ -115,7 +115,7 @@ def ground_wrench(
     return total
 
 
-def inverse_dynamics(
+def wrench_and_efforts(
     bodies: Bodies,
     qd: Sequence[Scalar],
     qdd: Sequence[Scalar],
@@ -153,7 +153,7 @@ class Composite:
         return Wrench(spin, twist.v * self.mass + cross(twist.omega, self.moment))
 
 
-def mass_matrix(bodies: Bodies) -> list[list[Scalar]]:
+def composite_mass_matrix(bodies: Bodies) -> list[list[Scalar]]:
     """Mass matrix for [base twist at the base origin; qd], by composite bodies."""
     robot = bodies.robot
     composite: dict[str, Composite] = {}

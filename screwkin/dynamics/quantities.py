@@ -47,8 +47,8 @@ def momentum(
     """
     check_mass(robot)
     bodies = Bodies.of(robot, T_world_base.R, q)
-    h = newton_euler.momentum(bodies, qd, base_twist or NO_TWIST)
-    return wrench_at(mass.center_of_mass(robot, bodies.poses), h)
+    h = newton_euler.total_momentum(bodies, qd, base_twist or NO_TWIST)
+    return wrench_at(mass.mass_center(robot, bodies.poses), h)
 
 
 @formula
@@ -77,7 +77,7 @@ def mass_matrix(robot: Robot, T_world_base: Pose, q: Joints) -> Columns:
     Source: Featherstone (2008), section 6.2.
     """
     refuse_closures(robot, "mass_matrix", LOOPS)
-    return newton_euler.mass_matrix(Bodies.of(robot, T_world_base.R, q))
+    return newton_euler.composite_mass_matrix(Bodies.of(robot, T_world_base.R, q))
 
 
 @formula
@@ -120,7 +120,7 @@ def inverse_dynamics(
     Source: Featherstone (2008), section 5.3.
     """
     refuse_closures(robot, "inverse_dynamics", LOOPS)
-    wrench, efforts = newton_euler.inverse_dynamics(
+    wrench, efforts = newton_euler.wrench_and_efforts(
         Bodies.of(robot, T_world_base.R, q),
         qd,
         qdd,
@@ -168,7 +168,7 @@ def ground_wrench(
         True
     """
     bodies = Bodies.of(robot, T_world_base.R, q)
-    wrench = newton_euler.ground_wrench(
+    wrench = newton_euler.required_wrench(
         bodies, qd, qdd, base_twist or NO_TWIST, base_acceleration or NO_TWIST, gravity
     )
     return wrench_at(-T_world_base.p, wrench)
@@ -200,15 +200,15 @@ def balance(
     """
     check_mass(robot)
     bodies = Bodies.of(robot, T_world_base.R, q)
-    wrench = newton_euler.ground_wrench(bodies, qd, qdd, base_twist, base_acceleration, GRAVITY)
-    local = mass.center_of_mass(robot, bodies.poses)
+    wrench = newton_euler.required_wrench(bodies, qd, qdd, base_twist, base_acceleration, GRAVITY)
+    local = mass.mass_center(robot, bodies.poses)
     com = T_world_base.p + local
     rise = wrench.f * (1.0 / robot.mass)
     cart = cart_table_zmp(com, Vector(rise.x, rise.y, rise.z - GRAVITY), GRAVITY)
     zmp = zmp_from_wrench(wrench, T_world_base.p)
     return {
         "com": com,
-        "momentum": wrench_at(local, newton_euler.momentum(bodies, qd, base_twist)),
+        "momentum": wrench_at(local, newton_euler.total_momentum(bodies, qd, base_twist)),
         "wrench": wrench_at(-T_world_base.p, wrench),
         "zmp": [zmp.x, zmp.y],
         "cart_table": [cart.x, cart.y],

@@ -83,7 +83,7 @@ def prepare(robot: Robot, *quantities: Choice) -> None:
         name, *words = (choice,) if isinstance(choice, str) else choice
         if name in ALGORITHMS:
             for program in ALGORITHMS[name](robot):
-                run.prepare(program)
+                run.compile_program(program)
             continue
         quantity = quantity_of(name)
         every = [tuple(words)] if words else choices_of(robot, quantity)

@@ -20,7 +20,7 @@ from screwkin.errors import InputError, UnknownNameError
 from screwkin.export.quantities import QUANTITIES, programs
 from screwkin.ik import programs as limbs
 from screwkin.ik.closed import recognised
-from screwkin.kinematics.positions import frame_pose, link_displacements
+from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.tip_motion import motion_program
 from screwkin.model.robot import Robot
@@ -115,7 +115,7 @@ def example(robot: Robot, program: Program) -> dict[str, Array]:
     told["contact"] = np.ones(len({sole.limb for sole in robot.soles}))
     D = link_displacements(robot, q.tolist())
     for limb in robot.limbs:
-        pose = as_array(frame_pose(robot, D, limb.tip))
+        pose = as_array(pose_in_base(robot, D, limb.tip))
         told[identifier("T_world", limb.tip)] = T @ pose
         if program.name == identifier(robot.name, limb.name, "nearest"):
             told |= {"T_base_tip": pose, "guess": home[list(SerialChain.of(robot, limb.name).joints)]}

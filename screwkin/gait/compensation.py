@@ -35,7 +35,7 @@ from screwkin.gait.feed_forward import walking_torques
 from screwkin.gait.loads import load_distribution
 from screwkin.ik.pose import solve_pose
 from screwkin.kinematics.limits import excess, limits_of, within, worst_joint
-from screwkin.kinematics.positions import frame_pose, link_displacements
+from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 from screwkin.trajectory import Trajectory, check_joints
@@ -197,7 +197,7 @@ def _swing_errors(
         D = link_displacements(robot, unstack(q[rows]))
         for j, foot in enumerate(trajectory.feet):
             if j != i:
-                before = as_array((T @ frame_pose(robot, D, foot)).p, (len(rows),))
+                before = as_array((T @ pose_in_base(robot, D, foot)).p, (len(rows),))
                 errors[rows, j] = before + bent.of(foot)[:, 3:] - trajectory.T_world_tip[foot][rows, :3, 3]
     return errors
 
@@ -205,7 +205,7 @@ def _swing_errors(
 def _standing(robot: Robot, trajectory: Trajectory, q: Array, foot: int, rows: NDArray[np.intp]) -> State:
     """The robot commanded q[rows] (B, n) on one foot, which stands where the trajectory has it."""
     stance = trajectory.feet[foot]
-    own = frame_pose(robot, link_displacements(robot, unstack(q[rows])), stance)
+    own = pose_in_base(robot, link_displacements(robot, unstack(q[rows])), stance)
     base = pose_from_array(trajectory.T_world_tip[stance][rows]) @ own.inverse
     return State(as_array(base, (len(rows),)), q[rows])
 

@@ -19,7 +19,7 @@ from screwkin.algebra.se3 import (
     unstack,
     vector_from_array,
 )
-from screwkin.dynamics.newton_euler import GRAVITY, Bodies, inverse_dynamics
+from screwkin.dynamics.newton_euler import GRAVITY, Bodies, wrench_and_efforts
 from screwkin.gait.loads import load_distribution
 from screwkin.model.robot import Robot
 from screwkin.trajectory import Trajectory
@@ -40,7 +40,7 @@ def walking_torques(robot: Robot, trajectory: Trajectory) -> Array:
     """
     shares, batch = load_distribution(trajectory), (trajectory.samples,)
     bodies = Bodies.of(robot, pose_from_array(trajectory.T_world_base).R, unstack(trajectory.q))
-    ground, free = inverse_dynamics(
+    ground, free = wrench_and_efforts(
         bodies,
         unstack(trajectory.qd),
         unstack(trajectory.qdd),

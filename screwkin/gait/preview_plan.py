@@ -15,7 +15,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, pose_from_array, twist_from_array, unstack
-from screwkin.dynamics.newton_euler import Bodies, momentum
+from screwkin.dynamics.newton_euler import Bodies, total_momentum
 from screwkin.errors import Fault, GaitError, NoSolutionError
 from screwkin.gait.balance import ground_reaction
 from screwkin.gait.footsteps import Foothold, footholds, swing_side
@@ -26,7 +26,7 @@ from screwkin.gait.preview import CartMotion, follow_reference, preview_gains
 from screwkin.gait.realise import differentiate, positions
 from screwkin.gait.record import Gait
 from screwkin.gait.stance import Stance
-from screwkin.kinematics.mass import center_of_mass
+from screwkin.kinematics.mass import mass_center
 from screwkin.kinematics.positions import link_displacements
 from screwkin.mechanism.mechanism import Mechanism
 from screwkin.model.robot import Robot
@@ -176,7 +176,7 @@ def _waist(gait: Gait, cart: CartMotion, phase: Motion) -> Motion:
 def _com(robot: Robot, planned: Plan, q: Array) -> Array:
     """CoM of all links (T, 3) [m]."""
     D = link_displacements(robot, unstack(q))
-    return np.asarray(as_array(pose_from_array(planned.T_world_base) @ center_of_mass(robot, D), (len(q),)))
+    return np.asarray(as_array(pose_from_array(planned.T_world_base) @ mass_center(robot, D), (len(q),)))
 
 
 def _followed(mechanism: Mechanism, planned: Plan, wanted: Array) -> tuple[Plan, Array]:
@@ -245,7 +245,7 @@ def _com_rates(mechanism: Mechanism, planned: Plan, q: Array) -> tuple[Array, Ar
     robot = mechanism.robot
     motion = differentiate(mechanism, planned, State(planned.T_world_base, q))
     T, qd = pose_from_array(planned.T_world_base), unstack(motion.qd)
-    h = momentum(Bodies.of(robot, T.R, unstack(q)), qd, twist_from_array(planned.base_twist))
+    h = total_momentum(Bodies.of(robot, T.R, unstack(q)), qd, twist_from_array(planned.base_twist))
     velocity = as_array(h.f, (len(q),)) / robot.mass
     twists = planned.base_twist, planned.base_acceleration
     wrench = ground_reaction(robot, planned.T_world_base, q, motion.qd, motion.qdd, *twists)[2]

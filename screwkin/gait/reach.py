@@ -17,8 +17,8 @@ from screwkin.ik.pose_solution import PoseSolution
 from screwkin.kinematics.landmarks import limb_root, waist_frame
 from screwkin.kinematics.positions import (
     chain_jacobian,
-    frame_pose,
     link_displacements,
+    pose_in_base,
     successive_displacement,
 )
 from screwkin.model.robot import Limb, Robot
@@ -137,7 +137,7 @@ def _residual(
     q = np.reshape(solution.state.q, (-1, len(robot.joints)))[sample]
     T = pose_from_array(np.reshape(solution.state.T_world_base, (-1, 4, 4))[sample])
     D = link_displacements(robot, unstack(q))
-    tip, wanted = frame_pose(robot, D, limb.tip), T.inverse @ pose_from_array(target)
+    tip, wanted = pose_in_base(robot, D, limb.tip), T.inverse @ pose_from_array(target)
     turn, gap = rotation_log(wanted.R @ tip.R.T), wanted.p - tip.p
     return np.concatenate([as_array(waist.R.T @ v).astype(float) for v in (turn, gap)])
 
@@ -152,7 +152,7 @@ def _advice(robot: Robot, plan: Plan, limb: Limb) -> str:
     """Keys of the gait that bring a limb's targets nearer, with their values now and at home."""
     gait, back = plan.gait, waist_frame(robot).inverse
     D = link_displacements(robot, list(robot.posture("home").q))
-    tip = (back @ frame_pose(robot, D, limb.tip)).p
+    tip = (back @ pose_in_base(robot, D, limb.tip)).p
     if limb.kind != "leg":
         drop = float((back @ limb_root(robot, limb.name)).z - tip.z)
         return f"Set hand_drop (now {gait.hand_drop:g} m) nearer to that at home, {drop:.3g} m"

@@ -15,7 +15,7 @@ from screwkin.gait.plan import Plan
 from screwkin.gait.reach import refuse_unreachable
 from screwkin.ik.pose import solve_pose
 from screwkin.ik.pose_solution import PoseSolution
-from screwkin.kinematics.positions import frame_pose, link_displacements
+from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.mechanism.choice import RANK_TOLERANCE
 from screwkin.mechanism.joint_motion import JointMotion, joint_motion
 from screwkin.mechanism.mechanism import Mechanism
@@ -54,7 +54,7 @@ def _targets(mechanism: Mechanism, planned: Plan) -> dict[str, Array]:
         if not _turns(mechanism, hand):
             targets[hand] = position
             continue
-        level = as_array(frame_pose(robot, home, hand).R)
+        level = as_array(pose_in_base(robot, home, hand).R)
         pose = planned.T_world_base.copy()
         pose[:, :3, :3] = planned.T_world_base[:, :3, :3] @ level
         pose[:, :3, 3] = position

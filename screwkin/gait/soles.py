@@ -22,7 +22,7 @@ def outlines(corners: Array, motion: Motion) -> Array:
     return np.asarray(np.einsum("tij,kj->tki", R, corners) + np.stack([x, y], axis=-1)[:, None])
 
 
-def separation(a: Array, b: Array) -> Array:
+def sole_distance(a: Array, b: Array) -> Array:
     """Gap (T,) [m] between convex polygons (T, k, 2), corners counter-clockwise; negative: they overlap.
 
     By separating axes: some edge of one of two disjoint convex polygons has the other one beyond it.
@@ -57,7 +57,7 @@ def check_soles(gait: Gait, stance: Stance, feet: dict[str, Motion], time: Array
         outlines(convex_hull(np.asarray(foot.sole + foot.body, dtype=float)), feet[foot.name])
         for foot in (first, second)
     )
-    gap = separation(a, b)
+    gap = sole_distance(a, b)
     if gap.min() < -_TOUCH:
         early = int(np.argmax(gap < -_TOUCH))
         raise NoSolutionError(

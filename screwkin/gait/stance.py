@@ -12,7 +12,7 @@ from screwkin.algebra.se3 import IDENTITY, Pose, Vector
 from screwkin.dynamics.support import sole_corners
 from screwkin.errors import InputError, ShapeError
 from screwkin.kinematics.landmarks import limb_root, waist_frame
-from screwkin.kinematics.positions import frame_pose, link_displacements
+from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.model.robot import Limb, Robot
 
 LEFT, RIGHT = 1, -1
@@ -99,7 +99,7 @@ def stance_of(robot: Robot) -> Stance:
     D, back = link_displacements(robot, list(robot.posture("home").q)), waist_frame(robot).inverse
     feet, hands, places = [], [], []
     for limb in robot.limbs:
-        y = float((back @ frame_pose(robot, D, limb.tip).p).y)
+        y = float((back @ pose_in_base(robot, D, limb.tip).p).y)
         side = LEFT if y > 0 else RIGHT
         if limb.kind == "leg":
             feet.append(Foot(limb.tip, side, _sole(robot, limb), _body(robot, limb)))

@@ -15,7 +15,7 @@ from screwkin.gait.preview_plan import preview_plan
 from screwkin.gait.realise import differentiate, positions
 from screwkin.gait.record import Gait
 from screwkin.gait.stance import stance_of
-from screwkin.kinematics.positions import frame_pose, link_displacements
+from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.mechanism.choice import closed_mechanism
 from screwkin.mechanism.rates import block_names
 from screwkin.model.robot import Robot, robot_text
@@ -101,7 +101,7 @@ def _tip_poses(robot: Robot, planned: Plan, q: Array) -> dict[str, Array]:
     return {
         tip: planned.T_world_tip[tip]
         if tip in planned.T_world_tip
-        else as_array(T @ frame_pose(robot, D, tip), (len(q),))
+        else as_array(T @ pose_in_base(robot, D, tip), (len(q),))
         for tip in robot.tip_names
     }
 

@@ -19,7 +19,7 @@ from screwkin.ik.family import Formulas
 from screwkin.ik.hip_equations import HipEquations, chosen, pitch_directions
 from screwkin.ik.planar_triangle import flattened, planar_branches
 from screwkin.ik.subproblems import turn_onto
-from screwkin.kinematics.axis_geometry import ALIKE, angle, apart, listed, parallel
+from screwkin.kinematics.axis_geometry import ALIKE, angle, apart, joint_list, parallel
 from screwkin.kinematics.serial_chain import SerialChain
 
 SAME = 1e-7
@@ -43,24 +43,24 @@ def recognise(chain: SerialChain) -> Formulas | list[str]:
 def parallel_axes_faults(chain: SerialChain) -> list[str]:
     """What keeps the chain from having three parallel axes in the middle."""
     faults = [
-        f"the axes of {listed(chain, pair)} are not parallel ({np.degrees(angle(chain, *pair)):.3g} deg)"
+        f"the axes of {joint_list(chain, pair)} are not parallel ({np.degrees(angle(chain, *pair)):.3g} deg)"
         for pair in ((2, 3), (3, 4))
         if not parallel(chain, *pair)
     ]
     if faults:
         return faults
     faults = [
-        f"the axes of {listed(chain, pair)} fall together"
+        f"the axes of {joint_list(chain, pair)} fall together"
         for pair in ((2, 3), (3, 4))
         if apart(chain, *pair) <= ALIKE * chain.length
     ]
     faults += [
-        f"the axes of {listed(chain, pair)} are parallel too"
+        f"the axes of {joint_list(chain, pair)} are parallel too"
         for pair in ((1, 2), (4, 5))
         if parallel(chain, *pair)
     ]
     if parallel(chain, 0, 1) and apart(chain, 0, 1) <= ALIKE * chain.length:
-        faults.append(f"the axes of {listed(chain, (0, 1))} fall together")
+        faults.append(f"the axes of {joint_list(chain, (0, 1))} fall together")
     return faults
 
 

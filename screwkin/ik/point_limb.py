@@ -13,17 +13,17 @@ from screwkin.algebra.screws import Screw
 from screwkin.algebra.se3 import Vector, dot, rotate
 from screwkin.ik.family import Formulas
 from screwkin.ik.subproblems import level_turns, two_turns
-from screwkin.kinematics.axis_geometry import listed, meeting, parallel
+from screwkin.kinematics.axis_geometry import joint_list, meeting, parallel
 from screwkin.kinematics.serial_chain import SerialChain
 
 
 def recognise(chain: SerialChain) -> Formulas | list[str]:
     """The branches of a chain whose first two axes meet in a shoulder, or what it lacks."""
     if parallel(chain, 0, 1):
-        return [f"the axes of {listed(chain, (0, 1))} are parallel"]
+        return [f"the axes of {joint_list(chain, (0, 1))} are parallel"]
     shoulder = meeting(chain, (0, 1))
     if shoulder is None:
-        return [f"the axes of {listed(chain, (0, 1))} do not meet in a point"]
+        return [f"the axes of {joint_list(chain, (0, 1))} do not meet in a point"]
     return Formulas(lambda wanted: point_branches(chain.screws, shoulder, chain.tip.p, wanted))
 
 

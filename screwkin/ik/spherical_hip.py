@@ -15,7 +15,7 @@ from screwkin.algebra.screws import Screw
 from screwkin.algebra.se3 import Pose, Vector, dot, rotate
 from screwkin.ik.family import Formulas
 from screwkin.ik.subproblems import level_turns, three_turns, two_turns
-from screwkin.kinematics.axis_geometry import listed, meeting, parallel
+from screwkin.kinematics.axis_geometry import joint_list, meeting, parallel
 from screwkin.kinematics.serial_chain import SerialChain
 
 
@@ -32,12 +32,12 @@ def recognise(chain: SerialChain) -> Formulas | list[str]:
 def spherical_hip_faults(chain: SerialChain) -> list[str]:
     """What keeps the chain from being a spherical hip, knee and universal ankle."""
     faults = [
-        f"the axes of {listed(chain, pair)} are parallel"
+        f"the axes of {joint_list(chain, pair)} are parallel"
         for pair in ((0, 1), (1, 2), (4, 5))
         if parallel(chain, *pair)
     ]
     faults += [
-        f"the axes of {listed(chain, joints)} do not meet in a point"
+        f"the axes of {joint_list(chain, joints)} do not meet in a point"
         for joints in ((0, 1, 2), (4, 5))
         if not faults and meeting(chain, joints) is None
     ]

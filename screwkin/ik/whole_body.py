@@ -16,7 +16,7 @@ from screwkin.ik.numeric import IkSettings, arrived, solve_system
 from screwkin.ik.pose_solution import PoseSolution
 from screwkin.ik.system import System
 from screwkin.kinematics import limits
-from screwkin.kinematics.arrays import rigid as refuse_foreign
+from screwkin.kinematics.arrays import check_rigid as refuse_foreign
 from screwkin.kinematics.rigid import nearest_poses
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.kinematics.status import CLOSED, SINGULAR, Status

@@ -33,7 +33,7 @@ class Argument:
     name: str
     label: str
     shape: tuple[int, ...]
-    rigid: bool = False
+    check_rigid: bool = False
     of: str = ""
 
 
@@ -60,7 +60,7 @@ def checked_inputs(
     batch = one_batch({a.label: (x, len(a.shape)) for a, x in zip(arguments, found, strict=True)})
     for argument, array in zip(arguments, found, strict=True):
         if argument.rigid:
-            rigid(argument.label, array)
+            check_rigid(argument.label, array)
     return found, batch
 
 
@@ -106,7 +106,7 @@ def of_shape(name: str, array: Any, *shape: int) -> Array:
     return array
 
 
-def rigid(name: str, T: Array) -> Array:
+def check_rigid(name: str, T: Array) -> Array:
     """Checked poses (..., 4, 4) that are rigid displacements; JAX arrays, perhaps traced, are taken as told.
 
     Raises:

@@ -51,6 +51,6 @@ def apart(chain: SerialChain, i: int, j: int) -> float:
     return float(np.linalg.norm(np.cross(as_array(a.s), as_array(b.s0 - a.s0))))
 
 
-def listed(chain: SerialChain, joints: Sequence[int]) -> str:
+def joint_list(chain: SerialChain, joints: Sequence[int]) -> str:
     """Names of joints for a message."""
     return ", ".join(chain.names[i] for i in joints)

@@ -70,7 +70,7 @@ def frame_pose(robot: Robot, T_world_base: Pose, q: Joints, frame: str) -> Pose:
 
     Source: paper A, eq. 2-3.
     """
-    return _world(T_world_base, positions.frame_pose(robot, _turned(robot, T_world_base, q), frame))
+    return _world(T_world_base, positions.pose_in_base(robot, _turned(robot, T_world_base, q), frame))
 
 
 @formula
@@ -97,7 +97,7 @@ def tip_poses(robot: Robot, T_world_base: Pose, q: Joints) -> list[Pose]:
     if not robot.limbs:
         raise InputError(f"{robot.name} has no limbs, so that it has no tips; write [[limb]] into its table")
     D = _turned(robot, T_world_base, q)
-    return [_world(T_world_base, positions.frame_pose(robot, D, limb.tip)) for limb in robot.limbs]
+    return [_world(T_world_base, positions.pose_in_base(robot, D, limb.tip)) for limb in robot.limbs]
 
 
 @formula
@@ -138,7 +138,7 @@ def jacobian(
         [0.0, 0.0, 0.0, 1.0, 0.0, 0.0]
     """
     D, turned = positions.link_displacements(robot, q), Pose(T_world_base.R, ZERO)
-    p = (turned @ positions.frame_pose(robot, D, frame)).p if point is None else point - T_world_base.p
+    p = (turned @ positions.pose_in_base(robot, D, frame)).p if point is None else point - T_world_base.p
     columns = positions.frame_jacobian(robot, positions.joint_twists(robot, D, turned), frame)
     if base_twist_at not in ("base", "point"):
         raise InputError(f"base_twist_at is {base_twist_at!r}; valid: base, point")
@@ -160,7 +160,7 @@ def limb_jacobian(robot: Robot, q: Joints, limb: str) -> Columns:
     """
     chosen = robot.limb(limb)
     D = positions.link_displacements(robot, q)
-    tip = positions.frame_pose(robot, D, chosen.tip).p
+    tip = positions.pose_in_base(robot, D, chosen.tip).p
     screws = positions.joint_screws(robot, D)
     return [at(tip, screws[i].twist) for i in robot.path_to(chosen.link)]
 
@@ -187,7 +187,7 @@ def center_of_mass(robot: Robot, T_world_base: Pose, q: Joints) -> Vector:
         (3,)
     """
     check_mass(robot)
-    return T_world_base @ mass.center_of_mass(robot, positions.link_displacements(robot, q))
+    return T_world_base @ mass.mass_center(robot, positions.link_displacements(robot, q))
 
 
 @formula
@@ -215,8 +215,8 @@ def com_jacobian(robot: Robot, T_world_base: Pose, q: Joints) -> Columns:
     check_mass(robot)
     turned, local = Pose(T_world_base.R, ZERO), positions.link_displacements(robot, q)
     D, twists = [turned @ d for d in local], positions.joint_twists(robot, local, turned)
-    c = mass.center_of_mass(robot, D)
-    return [*(at(c, twist).v for twist in BASIS), *mass.com_jacobian(robot, D, twists)]
+    c = mass.mass_center(robot, D)
+    return [*(at(c, twist).v for twist in BASIS), *mass.mass_center_velocities(robot, D, twists)]
 
 
 def _turned(robot: Robot, T: Pose, q: Sequence[Scalar]) -> list[Displacement]:

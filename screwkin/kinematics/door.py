@@ -16,7 +16,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.scalar import Scalar, is_jax, where
 from screwkin.compiler.program import Recorder
-from screwkin.compiler.run import chosen_path, machine_code, prepare, python_function, run_rows
+from screwkin.compiler.run import chosen_path, compile_program, machine_code, python_function, run_rows
 from screwkin.kinematics.arrays import Argument, checked_inputs, input_rows
 from screwkin.kinematics.rigid import deviation
 from screwkin.model.state import RIGID
@@ -48,7 +48,7 @@ class Door:
 
     def prepare(self) -> Door:
         """Compile the program, if there is a compiler; later calls use machine code."""
-        prepare(self.guarded)
+        compile_program(self.guarded)
         return self
 
     def __call__(self, arrays: Sequence[Any]) -> list[Array]:

@@ -27,7 +27,7 @@ from screwkin.compiler.records import identifier
 from screwkin.errors import InputError, expect
 from screwkin.kinematics.arrays import Argument, checked_inputs
 from screwkin.kinematics.door import Door
-from screwkin.kinematics.kinds import KINDS, STATE, Kind, documented, flattened, kind_of
+from screwkin.kinematics.kinds import KINDS, STATE, Kind, documented, shape_and_scalars, without_none
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 
@@ -96,10 +96,10 @@ class Definition:
         hints = get_type_hints(function, include_extras=True)
         subject, *parameters = inspect.signature(function).parameters.values()
         self.kinds: dict[str, Kind] = {
-            p.name: KINDS[kind] for p in parameters if (kind := kind_of(hints[p.name])) in KINDS
+            p.name: KINDS[kind] for p in parameters if (kind := without_none(hints[p.name])) in KINDS
         }
         self.choices = tuple(p.name for p in parameters if p.name not in self.kinds)
-        self.optional = {name for name in self.kinds if kind_of(hints[name]) is not hints[name]}
+        self.optional = {name for name in self.kinds if without_none(hints[name]) is not hints[name]}
         public = [
             p.replace(annotation="ArrayLike" if p.name in self.kinds else p.annotation)
             for p in parameters
@@ -231,7 +231,7 @@ class Definition:
         chosen = dict(zip(self.choices, choices, strict=True))
         value = self.function(subject, **records, **absent, **chosen)
         named = value if isinstance(value, dict) else {self.name: value}
-        return {name: flattened(one) for name, one in named.items()}
+        return {name: shape_and_scalars(one) for name, one in named.items()}
 
     def by_formula(
         self, subject: Any, given: Sequence[Given], choices: Sequence[Any], arrays: list[Any]

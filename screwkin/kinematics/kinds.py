@@ -120,7 +120,7 @@ STATE = ("T_world_base", "q")
 """The arguments that arrive together, as a ``State``."""
 
 
-def kind_of(annotation: Any) -> Any:
+def without_none(annotation: Any) -> Any:
     """An annotation without its None."""
     if get_origin(annotation) in (Union, UnionType):
         options = [option for option in get_args(annotation) if option is not type(None)]
@@ -128,7 +128,7 @@ def kind_of(annotation: Any) -> Any:
     return annotation
 
 
-def flattened(value: Any) -> tuple[tuple[int, ...], list[Scalar]]:
+def shape_and_scalars(value: Any) -> tuple[tuple[int, ...], list[Scalar]]:
     """Shape and scalars, row by row, of a result.
 
     A pose is (4, 4), a list of poses (k, 4, 4), a list of scalars (k,), a list of columns, which are twists,

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from screwkin.algebra.screws import Screw
 from screwkin.algebra.se3 import IDENTITY, Pose, Rotation, Vector, cross, dot, map_scalars, norm
 from screwkin.errors import InputError
-from screwkin.kinematics.positions import frame_pose, link_displacements
+from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.model.robot import Joint, Limb, Robot
 
 _PARALLEL = 0.1
@@ -58,7 +58,7 @@ def waist_frame(robot: Robot) -> Pose:
     if not legs:
         return IDENTITY
     D = link_displacements(robot, list(robot.posture("home").q))
-    feet = [frame_pose(robot, D, leg.tip).R for leg in legs]
+    feet = [pose_in_base(robot, D, leg.tip).R for leg in legs]
     up, ahead = _mean([foot.z for foot in feet]), _mean([foot.x for foot in feet])
     forward = ahead - up * dot(ahead, up)
     if min(norm(up), norm(forward)) < _OPPOSED:

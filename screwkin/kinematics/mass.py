@@ -21,12 +21,12 @@ def first_moment(robot: Robot, displacements: Placements) -> Vector:
     return total
 
 
-def center_of_mass(robot: Robot, displacements: Placements) -> Vector:
+def mass_center(robot: Robot, displacements: Placements) -> Vector:
     """CoM of the whole robot, in the frame of ``displacements`` [m]."""
     return first_moment(robot, displacements) * (1 / robot.mass)
 
 
-def com_jacobian(robot: Robot, displacements: Placements, twists: Sequence[Twist]) -> list[Vector]:
+def mass_center_velocities(robot: Robot, displacements: Placements, twists: Sequence[Twist]) -> list[Vector]:
     """Velocity of the CoM per unit rate of each joint: its subtree's share of the mass, on its screw."""
     mass: dict[str, Scalar] = {}
     moment: dict[str, Vector] = {}

@@ -66,7 +66,7 @@ def joint_twists(robot: Robot, displacements: Sequence[Displacement], T: Pose = 
     return [screw.twist for screw in joint_screws(robot, displacements, T)]
 
 
-def frame_pose(robot: Robot, displacements: Sequence[Displacement], name: str) -> Pose:
+def pose_in_base(robot: Robot, displacements: Sequence[Displacement], name: str) -> Pose:
     """Pose of ``base``, a link or a tip in the base frame."""
     link, home = robot.frame(name)
     return displacements[robot.link_names.index(link)] @ home

@@ -18,7 +18,7 @@ from screwkin.algebra.se3 import UNTURNED, Rotation, norm, rotation_log
 from screwkin.errors import InputError, SingularError, UnknownNameError, expect
 from screwkin.kinematics.positions import link_displacements
 from screwkin.mechanism.mechanism import Mechanism, coupling_graph, virtual_chains
-from screwkin.mechanism.network import coupling_twists, network_matrix
+from screwkin.mechanism.network import coupling_twists, network_of_twists
 from screwkin.mechanism.scaling import characteristic_length, referenced
 from screwkin.model.robot import Robot
 
@@ -54,7 +54,7 @@ def independent(N: Array, order: Sequence[int]) -> list[int]:
 
 def network_at(mechanism: Mechanism, q: Sequence[float], R: Rotation = UNTURNED) -> Array:
     """Length-normalised N at one posture, every circuit at its reference point."""
-    return referenced(mechanism, network_matrix(mechanism, coupling_twists(mechanism, R, list(q))))
+    return referenced(mechanism, network_of_twists(mechanism, coupling_twists(mechanism, R, list(q))))
 
 
 def preference(mechanism: Mechanism) -> list[int]:

@@ -27,11 +27,11 @@ from screwkin.algebra.se3 import (
     unstack,
 )
 from screwkin.errors import InputError, NoSolutionError, UnknownNameError
-from screwkin.kinematics.positions import frame_pose, link_displacements
+from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.kinematics.status import CLOSED, SINGULAR, Status
 from screwkin.mechanism.chains import chain_coordinates, chain_pose
 from screwkin.mechanism.mechanism import Mechanism, coupling_graph, virtual_chains
-from screwkin.mechanism.network import coupling_twists, network_matrix
+from screwkin.mechanism.network import coupling_twists, network_of_twists
 from screwkin.mechanism.scaling import characteristic_length
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
@@ -62,7 +62,7 @@ def coordinates_from_state(mechanism: Mechanism, T: Pose, q: Sequence[Scalar]) -
     D = link_displacements(robot, q)
     values = dict(zip(robot.joint_names, q, strict=True))
     for chain in mechanism.chains:
-        body = T if chain.limb is None else T @ frame_pose(robot, D, chain.limb.tip)
+        body = T if chain.limb is None else T @ pose_in_base(robot, D, chain.limb.tip)
         coordinates = chain_coordinates(chain.couplings, body, mechanism.held(chain, T))
         values |= zip(chain.names, coordinates, strict=True)
     return [values[name] for name in mechanism.couplings]
@@ -91,7 +91,7 @@ def closure_errors(mechanism: Mechanism, coordinates: Sequence[Scalar], fixed: P
         if chain.limb is not None:
             values = [coordinates[mechanism.position[name]] for name in chain.names]
             end = chain_pose(chain.couplings, values, mechanism.held(chain, base))
-            ends.append((base @ frame_pose(robot, D, chain.limb.tip), end))
+            ends.append((base @ pose_in_base(robot, D, chain.limb.tip), end))
     for closure in robot.closures:
         a, b = carried[closure.link_a] @ closure.frame_a, carried[closure.link_b] @ closure.frame_b
         ends.append((base @ a, base @ b))
@@ -144,7 +144,7 @@ def close_loops(mechanism: Mechanism, guess: State, imposed: Mapping[str, Array]
         joints = [scalars[mechanism.position[name]] for name in mechanism.robot.joint_names]
         turned = base_pose(mechanism, scalars, fixed).R
         twists = coupling_twists(mechanism, turned, joints, ZERO)
-        N = network_matrix(mechanism, twists, (len(samples),), mechanism.closing_matrix)
+        N = network_of_twists(mechanism, twists, (len(samples),), mechanism.closing_matrix)
         return missing * scale, N[..., columns] * scale[:, None]
 
     result = newton(residual, x[:, columns])
@@ -188,7 +188,7 @@ def nearest_closed(robot: Robot, q: Array) -> Array:
         full[:, order] = joints
         missing = as_array(closure_errors(mechanism, unstack(full), IDENTITY), (len(joints),))
         twists = coupling_twists(mechanism, UNTURNED, unstack(joints))
-        N = network_matrix(mechanism, twists, (len(joints),), mechanism.closing_matrix)
+        N = network_of_twists(mechanism, twists, (len(joints),), mechanism.closing_matrix)
         return missing.reshape(len(joints), -1) * scale, N[..., order] * scale[:, None]
 
     result = newton(residual, np.asarray(q, dtype=float)[None])

@@ -14,14 +14,14 @@ Integers = np.ndarray[Any, np.dtype[np.int64]]
 
 
 @dataclass(frozen=True)
-class Graph:
+class CouplingGraph:
     """Vertices by name; edges as (name, tail, head), pointing from the carrying link to the carried one."""
 
     vertices: tuple[str, ...]
     edges: tuple[tuple[str, str, str], ...]
 
 
-def incidence_matrix(graph: Graph) -> Integers:
+def incidence_matrix(graph: CouplingGraph) -> Integers:
     """(vertices, edges): -1 where an edge leaves, +1 where it arrives."""
     row = {name: i for i, name in enumerate(graph.vertices)}
     A = np.zeros((len(graph.vertices), len(graph.edges)), dtype=np.int64)
@@ -31,7 +31,7 @@ def incidence_matrix(graph: Graph) -> Integers:
     return A
 
 
-def spanning_tree(graph: Graph) -> tuple[int, ...]:
+def spanning_tree(graph: CouplingGraph) -> tuple[int, ...]:
     """Indices of the edges of a spanning tree, preferring earlier edges; the others are chords."""
     group = {name: name for name in graph.vertices}
 
@@ -49,7 +49,7 @@ def spanning_tree(graph: Graph) -> tuple[int, ...]:
     return tuple(tree)
 
 
-def cut_set_matrix(graph: Graph) -> Integers:
+def cut_set_matrix(graph: CouplingGraph) -> Integers:
     """Fundamental cut-sets (vertices - components, edges): one row for each edge of the spanning tree."""
     tree = list(spanning_tree(graph))
     A = incidence_matrix(graph).astype(float)
@@ -58,7 +58,7 @@ def cut_set_matrix(graph: Graph) -> Integers:
     return np.rint(Q).astype(np.int64)
 
 
-def circuit_matrix(graph: Graph) -> Integers:
+def circuit_matrix(graph: CouplingGraph) -> Integers:
     """Fundamental circuits (chords, edges), each told so that its first edge counts +1."""
     tree = list(spanning_tree(graph))
     chords = [i for i in range(len(graph.edges)) if i not in set(tree)]

@@ -15,7 +15,7 @@ from screwkin.errors import InputError
 from screwkin.mechanism.least_values import least_values
 from screwkin.mechanism.mechanism import WAIST, Mechanism
 from screwkin.mechanism.network import blend
-from screwkin.mechanism.rates import secondary_accelerations, secondary_rates
+from screwkin.mechanism.rates import secondary_accelerations, solve_rates
 from screwkin.mechanism.tip_motion import motion_program, solvable_limbs
 from screwkin.mechanism.virtual_motion import primary_motion
 
@@ -109,7 +109,7 @@ def _by_couplings(
         return np.asarray(as_array([moving.get(name, 0.0) for name in mechanism.primary], batch))
 
     primary, driven = imposed(0), imposed(1)
-    following = secondary_rates(mechanism, T_world_base, q, primary).values
+    following = solve_rates(mechanism, T_world_base, q, primary).values
     rates = blend(columns[0], primary, columns[1], following)
     bent = secondary_accelerations(mechanism, T_world_base, q, rates, driven).values
     changes = blend(columns[0], driven, columns[1], bent)

@@ -14,7 +14,7 @@ from screwkin.algebra.singular_values import TRUSTED, least_singular_value
 from screwkin.compiler.program import Program, Recorder, kept
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.compiler.run import common_batch, run
-from screwkin.kinematics.positions import frame_pose, joint_screws, link_displacements
+from screwkin.kinematics.positions import joint_screws, link_displacements, pose_in_base
 from screwkin.mechanism.chains import chain_twists
 from screwkin.mechanism.limb_motion import seen_from
 from screwkin.mechanism.mechanism import Mechanism, mechanism_of
@@ -124,7 +124,7 @@ def _at_reference(
         return dict(zip(names, _limb_at_tip(screws, [q[i] for i in path], tip.limb.frame.p), strict=True))
     twists = dict(zip(mechanism.couplings, coupling_twists(mechanism, R, q), strict=True))
     D = link_displacements(robot, q, Displacement(R, ZERO, ZERO))
-    body, held = frame_pose(robot, D, tip.name), mechanism.held(tip, Pose(R, ZERO))
+    body, held = pose_in_base(robot, D, tip.name), mechanism.held(tip, Pose(R, ZERO))
     here = {name: at(body.p, twist) for name, twist in twists.items()}
     joints = zip(robot.joint_names, joint_screws(robot, D), strict=True)
     here |= {name: _twist(screw, body.p) for name, screw in joints}

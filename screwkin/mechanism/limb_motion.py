@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.screws import AT_REST, Displacement, Screw, advance, carry
 from screwkin.algebra.se3 import Pose, Rotation, Twist, Vector, bracket, cross
-from screwkin.kinematics.positions import frame_pose
+from screwkin.kinematics.positions import pose_in_base
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.limb_rates import Split, point_rates, pose_rates, split_of
 from screwkin.model.robot import Limb, Robot
@@ -57,10 +57,10 @@ class LimbMotion:
         split, path = split_of(chain), chain.joints
         carried = dict(zip(robot.link_names, D, strict=True))
         links = [robot.joints[path[0]].parent, *(robot.joints[i].child for i in path)]
-        link, fixed = point_of(chain, split)
+        link, fixed = reference_point(chain, split)
         point = carried[links[link]] @ fixed
         twists = seen_screws(chain, split, [q[i] for i in path], joints)
-        tip = frame_pose(robot, D, limb.tip)
+        tip = pose_in_base(robot, D, limb.tip)
         return cls(path, split, chain.length, tip, point, carried[links[joints]].R, twists)
 
     def _turned(self, omega: Vector, v: Vector) -> Twist:
@@ -108,7 +108,7 @@ class LimbMotion:
         return self._solved(wanted - known)[0]
 
 
-def point_of(chain: SerialChain, split: Split | None) -> tuple[int, Vector]:
+def reference_point(chain: SerialChain, split: Split | None) -> tuple[int, Vector]:
     """Where a limb's screws are expressed: the split's point, else the tip.
 
     Returns:
@@ -122,7 +122,7 @@ def seen_screws(
 ) -> tuple[Twist, ...]:
     """A limb's screws at ``point_of``, axes of the link after that many joints."""
     seen = seen_from(chain.screws, q, joints)
-    link, fixed = point_of(chain, split)
+    link, fixed = reference_point(chain, split)
     here = seen[link] @ fixed
     screws = [carry(d, screw) for d, screw in zip(seen, chain.screws, strict=False)]
     return tuple(Screw(s.s, s.s0 - here, s.pitch).twist for s in screws)

@@ -16,7 +16,7 @@ from screwkin.algebra.pattern import components
 from screwkin.algebra.se3 import IDENTITY, Pose
 from screwkin.mechanism import graph as graphs
 from screwkin.mechanism.chains import SPATIAL, check_chain, held_pose
-from screwkin.mechanism.graph import Graph, Integers
+from screwkin.mechanism.graph import CouplingGraph, Integers
 from screwkin.model.display import html_table, listing
 from screwkin.model.robot import Limb, Robot
 
@@ -53,7 +53,7 @@ class Mechanism:
 
     robot: Robot
     chains: tuple[VirtualChain, ...]
-    graph: Graph
+    graph: CouplingGraph
     primary: tuple[str, ...]
     secondary: tuple[str, ...]
     mobility: int
@@ -175,7 +175,7 @@ def virtual_chains(robot: Robot) -> tuple[VirtualChain, ...]:
     return tuple(chains)
 
 
-def coupling_graph(robot: Robot, chains: tuple[VirtualChain, ...]) -> Graph:
+def coupling_graph(robot: Robot, chains: tuple[VirtualChain, ...]) -> CouplingGraph:
     """Vertices and directed edges of the whole mechanism; closures weld the links that they join into one."""
     welded = {name: name for name in robot.link_names}
     if robot.base == "fixed":
@@ -209,7 +209,7 @@ def coupling_graph(robot: Robot, chains: tuple[VirtualChain, ...]) -> Graph:
     vertices = dict.fromkeys([FLOOR, *(welded[name] for name in robot.link_names)])
     vertices |= dict.fromkeys(vertex for _, tail, head in edges for vertex in (tail, head))
     used = {vertex for _, tail, head in edges for vertex in (tail, head)}
-    return Graph(tuple(v for v in vertices if v in used), tuple(edges))
+    return CouplingGraph(tuple(v for v in vertices if v in used), tuple(edges))
 
 
 def mechanism_of(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, ...]) -> Mechanism:

@@ -16,7 +16,7 @@ from screwkin.algebra.screws import at
 from screwkin.algebra.se3 import NO_TWIST, ZERO, Pose, Rotation, Twist, Vector, as_array, bracket
 from screwkin.kinematics.formula import formula
 from screwkin.kinematics.kinds import Columns, Joints
-from screwkin.kinematics.positions import frame_pose, joint_twists, link_displacements
+from screwkin.kinematics.positions import joint_twists, link_displacements, pose_in_base
 from screwkin.mechanism.chains import chain_twists
 from screwkin.mechanism.graph import Integers
 from screwkin.mechanism.mechanism import Mechanism
@@ -39,7 +39,7 @@ def coupling_twists(
     turned = Pose(R, ZERO)
     twists = dict(zip(robot.joint_names, joint_twists(robot, D, turned), strict=True))
     for chain in mechanism.chains:
-        body = turned if chain.limb is None else turned @ frame_pose(robot, D, chain.limb.tip)
+        body = turned if chain.limb is None else turned @ pose_in_base(robot, D, chain.limb.tip)
         R_chain = body.R @ mechanism.held(chain, turned).R.T
         twists |= zip(chain.names, chain_twists(chain.couplings, R_chain, body.p), strict=True)
     return [at(point, twists[name]) for name in mechanism.couplings]
@@ -72,7 +72,7 @@ def network_blocks(mechanism: Mechanism, twists: Sequence[Twist]) -> list[list[T
     ]
 
 
-def network_matrix(
+def network_of_twists(
     mechanism: Mechanism,
     twists: Sequence[Twist],
     batch: tuple[int, ...] = (),

@@ -143,7 +143,7 @@ def secondary_rates(
         Argument("primary", "primary_rates", (len(mechanism.primary),)),
     ]
     (T, q, primary), _ = checked_inputs(arguments, [state.T_world_base, state.q, primary_rates])
-    solution = rates.secondary_rates(mechanism, T, q, primary)
+    solution = rates.solve_rates(mechanism, T, q, primary)
     if on_singular == "status":
         return solution.values, _status(solution.singular.any(axis=-1), solution.values.shape[:-1])
     refuse_singular(mechanism, T, q, solution.singular)

@@ -62,7 +62,7 @@ def flat(array: Array, axes: int, batch: tuple[int, ...]) -> Array:
     return np.broadcast_to(array, (*batch, *inner)).reshape(math.prod(batch), *inner)
 
 
-def secondary_rates(mechanism: Mechanism, T_world_base: Array, q: Array, primary: Array) -> SecondarySolution:
+def solve_rates(mechanism: Mechanism, T_world_base: Array, q: Array, primary: Array) -> SecondarySolution:
     """Rates of the secondary couplings from those of the primary ones: eq. 11.
 
     Args:

@@ -13,7 +13,7 @@ from screwkin.algebra.screws import Displacement, at
 from screwkin.algebra.se3 import NO_TWIST, UNTURNED, Rotation, Twist, Vector, cross, dot
 from screwkin.compiler.program import Program, Recorder, kept
 from screwkin.compiler.records import identifier, pose_input
-from screwkin.kinematics.positions import frame_pose, link_displacements
+from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.limb_rates import Split, pose_rates, split_of
 from screwkin.mechanism.mechanism import Mechanism, VirtualChain, mechanism_of
@@ -102,7 +102,7 @@ def _bound(
     if all(name in sizes for name in names):
         return abs_(determinant) / (sum(sizes[name] for name in names) / 5) ** 2.5
     if tip is not None:
-        point, counted = frame_pose(mechanism.robot, D, tip.name).p, [twists[name] for name in names]
+        point, counted = pose_in_base(mechanism.robot, D, tip.name).p, [twists[name] for name in names]
     else:  # at the point nearest to all axes of the circuit their sum is not larger than at any other
         point, counted = near, [twists[name] for name in mechanism.circuits[circuit]]
     there = [at(point, twist) for twist in counted]

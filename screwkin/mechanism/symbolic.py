@@ -14,7 +14,7 @@ from typing import Any
 from screwkin.algebra.scalar import Scalar, is_symbolic
 from screwkin.algebra.se3 import ZERO, Twist, Vector, as_array, leaves, map_scalars
 from screwkin.errors import InputError
-from screwkin.kinematics.positions import frame_pose, joint_twists, link_displacements
+from screwkin.kinematics.positions import joint_twists, link_displacements, pose_in_base
 from screwkin.mechanism.chains import chain_screws
 from screwkin.mechanism.mechanism import Mechanism, coupling_graph, virtual_chains
 from screwkin.mechanism.network import network_blocks
@@ -69,7 +69,7 @@ def symbolic_limb(robot: Robot, limb: str) -> SymbolicLimb:
     q = [symbols[name] for name in single.joint_names]
     tidy = Tidy(single, q, tuple(symbols.values()))
     D = link_displacements(single, q)
-    tip = map_scalars(tidy, frame_pose(single, D, chosen.tip))
+    tip = map_scalars(tidy, pose_in_base(single, D, chosen.tip))
     columns = [map_scalars(tidy, t) for t in joint_twists(single, D)]
     twists = dict(zip(single.joint_names, columns, strict=True))
     origin = origin_symbols(single)

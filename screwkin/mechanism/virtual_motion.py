@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 
 from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.se3 import UNTURNED, ZERO, Pose, Rotation, Twist, Vector, cross, dot, rotate
-from screwkin.kinematics.positions import frame_pose, link_displacements
+from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.mechanism.chains import AXES, chain_coordinates, rotations
 from screwkin.mechanism.mechanism import Mechanism, VirtualChain
 
@@ -79,7 +79,7 @@ def primary_motion(
     D = link_displacements(mechanism.robot, q)
     motion: dict[str, Scalar] = {}
     for chain in imposing_chains(mechanism):
-        body = T if chain.limb is None else T @ frame_pose(mechanism.robot, D, chain.name)
+        body = T if chain.limb is None else T @ pose_in_base(mechanism.robot, D, chain.name)
         R = body.R @ mechanism.held(chain, T).R.T
         twist = twists[chain.name]
         if accelerations is None:

@@ -11,7 +11,7 @@ from screwkin.algebra.se3 import as_array, unstack
 from screwkin.analysis.compliance import Trial
 from screwkin.errors import InputError
 from screwkin.gait.balance import soles_on_floor
-from screwkin.kinematics.positions import frame_pose, link_displacements
+from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.papers.bench import Bench
 from screwkin.papers.measures_leg import compensated_of, map_of, sinking_of, zmp_lines
 from screwkin.papers.measures_springs import trial_of
@@ -152,7 +152,7 @@ def _seen_from_waist(bench: Bench, gait: str, limb: str, stiffness: float, robot
     commanded = compensated_of(bench, gait, stiffness, "swing", robot).q
     tip = account.robot.limb(limb).tip
     return [
-        as_array(frame_pose(account.robot, link_displacements(account.robot, unstack(q)), tip), (len(q),))[
+        as_array(pose_in_base(account.robot, link_displacements(account.robot, unstack(q)), tip), (len(q),))[
             :, :3, 3
         ]
         for q in (account.trajectory.q, commanded)

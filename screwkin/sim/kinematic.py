@@ -47,7 +47,7 @@ class KinematicBackend:
             raise InputError("the simulation has no state yet; call reset first")
         base = pose_from_array(self._pose)
         displacements = positions.link_displacements(self._robot, unstack(self._q))
-        feet = [base @ positions.frame_pose(self._robot, displacements, tip) for tip in self._legs]
+        feet = [base @ positions.pose_in_base(self._robot, displacements, tip) for tip in self._legs]
         return Observation(
             time=self._steps * self.dt,
             T_world_base=self._pose.copy(),

@@ -12,7 +12,7 @@ from scipy.linalg import expm
 import screwkin as sk
 from screwkin.algebra.screws import Screw
 from screwkin.algebra.se3 import IDENTITY, NO_TWIST, UNTURNED, Vector
-from screwkin.dynamics.newton_euler import Bodies, inverse_dynamics, mass_matrix
+from screwkin.dynamics.newton_euler import Bodies, composite_mass_matrix, wrench_and_efforts
 from screwkin.errors import ShapeError
 from screwkin.model.robot import Inertia, Joint, Link
 from tests.kinematics.machines import machine, random_state, random_tree
@@ -61,14 +61,14 @@ def lagrange():
 def test_the_double_pendulums_torques_are_lagranges(lagrange):
     robot, (q1, q2, v1, v2, b1, b2), g, wanted = lagrange
     bodies = Bodies.of(robot, UNTURNED, [q1, q2])
-    _, torques = inverse_dynamics(bodies, [v1, v2], [b1, b2], NO_TWIST, NO_TWIST, g)
+    _, torques = wrench_and_efforts(bodies, [v1, v2], [b1, b2], NO_TWIST, NO_TWIST, g)
     for found, tau in zip(torques, wanted, strict=True):
         assert sympy.simplify(sympy.expand_trig(found - tau)) == 0
 
 
 def test_the_double_pendulums_mass_matrix_is_the_accelerations_share(lagrange):
     robot, (q1, q2, *_, b1, b2), _, wanted = lagrange
-    M = mass_matrix(Bodies.of(robot, UNTURNED, [q1, q2]))
+    M = composite_mass_matrix(Bodies.of(robot, UNTURNED, [q1, q2]))
     for row, tau in enumerate(wanted):
         for column, b in enumerate((b1, b2)):
             assert sympy.simplify(sympy.expand_trig(M[6 + row][6 + column] - tau.diff(b))) == 0

@@ -9,7 +9,7 @@ from screwkin.errors import GaitError, NoSolutionError
 from screwkin.gait.files import load_gait
 from screwkin.gait.footsteps import footholds, swing_splines
 from screwkin.gait.plan import plan
-from screwkin.gait.soles import separation
+from screwkin.gait.soles import sole_distance
 
 
 def at_phases(gait, stance, steps, *phases):
@@ -139,7 +139,7 @@ def test_separation_of_polygons_agrees_with_an_independent_geometry_library():
     spin, shift = rng.uniform(-np.pi, np.pi, 400), rng.uniform(-2, 2, (400, 2))
     R = np.array([[np.cos(spin), -np.sin(spin)], [np.sin(spin), np.cos(spin)]]).transpose(2, 0, 1)
     moved = np.einsum("tij,kj->tki", R, box) + shift[:, None]
-    gap = separation(np.tile(box, (400, 1, 1)), moved)
+    gap = sole_distance(np.tile(box, (400, 1, 1)), moved)
     other = [shapely.Polygon(box).intersects(shapely.Polygon(corners)) for corners in moved]
     assert ((gap < 0) == other).all()
     assert 50 < sum(other) < 350

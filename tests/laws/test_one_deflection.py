@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import screwkin as sk
 from screwkin.analysis.workspace import workspace
 from screwkin.compiler import native
-from screwkin.compiler.run import prepare
+from screwkin.compiler.run import compile_program
 from screwkin.compliance.deflection import newton_step
 from screwkin.compliance.equilibrium import Loaded
 from screwkin.compliance.stiffness import static_deflection
@@ -81,7 +81,7 @@ def test_a_deflection_does_not_depend_on_its_neighbours(name, method):
 @pytest.mark.skipif(not native.compiler(), reason="there is no C compiler")
 def test_nor_on_whether_its_program_was_prepared():
     plain, prepared = (replace(sk.load_robot("poppy12")) for _ in range(2))
-    assert prepare(newton_step(prepared, "left_foot"))
+    assert compile_program(newton_step(prepared, "left_foot"))
     home = sk.home(plain)
     q = home.q + np.random.default_rng(1).uniform(-0.5, 0.5, (300, len(home.q)))
     state = sk.State(home.T_world_base, q)

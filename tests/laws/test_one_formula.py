@@ -19,8 +19,8 @@ import sympy
 import screwkin as sk
 from screwkin.algebra.screws import INFINITE, Screw, displacement
 from screwkin.algebra.se3 import UNTURNED, Vector, leaves, rotate
-from screwkin.kinematics.mass import center_of_mass, com_jacobian
-from screwkin.kinematics.positions import frame_pose, joint_twists, link_displacements
+from screwkin.kinematics.mass import mass_center, mass_center_velocities
+from screwkin.kinematics.positions import joint_twists, link_displacements, pose_in_base
 from screwkin.mechanism.network import coupling_twists, network_blocks
 from screwkin.model.table import load_robot, parse_robot
 from tests.kinematics.machines import random_tree
@@ -68,7 +68,7 @@ def axis_itself(x: Sequence[Any]) -> list[Any]:
 
 
 def tip_of_leg(q: Sequence[Any]) -> list[Any]:
-    return scalars(frame_pose(leg(), link_displacements(leg(), q), "right_foot"))
+    return scalars(pose_in_base(leg(), link_displacements(leg(), q), "right_foot"))
 
 
 def links_of_tree(q: Sequence[Any]) -> list[Any]:
@@ -81,7 +81,7 @@ def jacobian_of_leg(q: Sequence[Any]) -> list[Any]:
 
 def com_of_leg(q: Sequence[Any]) -> list[Any]:
     D = link_displacements(leg(), q)
-    return scalars([center_of_mass(leg(), D), *com_jacobian(leg(), D, joint_twists(leg(), D))])
+    return scalars([mass_center(leg(), D), *mass_center_velocities(leg(), D, joint_twists(leg(), D))])
 
 
 def network_block_of_leg(q: Sequence[Any]) -> list[Any]:
@@ -166,12 +166,12 @@ def test_parameters_are_scalars_too():
     twin = parse_robot(robot.text, symbolic=True)
     q = np.random.default_rng(0).uniform(-1, 1, 18).tolist()
     names = [name for name, value in robot.parameters.items() if value is not None]
-    tip = scalars(frame_pose(twin, link_displacements(twin, q), "right_foot"))
-    com = scalars(center_of_mass(twin, link_displacements(twin, q)))
+    tip = scalars(pose_in_base(twin, link_displacements(twin, q), "right_foot"))
+    com = scalars(mass_center(twin, link_displacements(twin, q)))
     symbols = [sympy.Symbol(name, real=True) for name in names]
     found = numbers_from(symbols, tip + com, np.array([[robot.parameters[name] for name in names]]))[0]
     D = link_displacements(robot, q)
-    wanted = scalars(frame_pose(robot, D, "right_foot")) + scalars(center_of_mass(robot, D))
+    wanted = scalars(pose_in_base(robot, D, "right_foot")) + scalars(mass_center(robot, D))
     np.testing.assert_allclose(found, wanted, atol=1e-14)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import screwkin as sk
-from screwkin.compiler.run import prepare
+from screwkin.compiler.run import compile_program
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.pose_solution import PoseSolution
 from screwkin.ik.programs import programs_of
@@ -59,7 +59,7 @@ def test_a_prepared_robot_gives_the_same_answers(name: str) -> None:
     targets, leg = targets_at(robot, q), robot.limbs[0]
     before, branches = solved(robot, targets), sk.limb_ik(robot, leg.name, targets_at(robot, q)[leg.tip])
     for program in programs_of(robot):
-        prepare(program)
+        compile_program(program)
     after, same = solved(robot, targets), sk.limb_ik(robot, leg.name, targets[leg.tip])
     np.testing.assert_array_equal(after.status, before.status)
     np.testing.assert_allclose(after.state.q, before.state.q, atol=1e-11)

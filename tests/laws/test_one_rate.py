@@ -19,7 +19,7 @@ from screwkin.mechanism.closure import close_loops
 from screwkin.mechanism.joint_motion import joint_motion
 from screwkin.mechanism.least_values import least_values
 from screwkin.mechanism.network import blend
-from screwkin.mechanism.rates import secondary_accelerations, secondary_rates
+from screwkin.mechanism.rates import secondary_accelerations, solve_rates
 from screwkin.mechanism.singularity import singularity_report
 from tests.kinematics.machines import random_mechanism
 from tests.laws.tables import as_pose, based, moved_base, necked, shuffled, slid, somewhere, waisted
@@ -51,7 +51,7 @@ def turns(mechanism: sk.Mechanism, count: int) -> sk.State:
 
 def answers(mechanism: sk.Mechanism, T: np.ndarray, q: np.ndarray, p: np.ndarray) -> list[np.ndarray]:
     """Rates, where they are singular, accelerations for constant primary rates, singular values."""
-    rates = secondary_rates(mechanism, T, q, p)
+    rates = solve_rates(mechanism, T, q, p)
     every = blend(mechanism.primary_columns, p, mechanism.secondary_columns, rates.values)
     bent = secondary_accelerations(mechanism, T, q, every, 0 * p)
     return [rates.values, rates.singular, bent.values, bent.singular, least_values(mechanism, T, q)]
@@ -194,8 +194,8 @@ def test_the_order_of_rows_means_nothing(name: str, seed: int) -> None:
     rates = np.random.default_rng(seed).uniform(-1, 1, (2, len(mechanism.primary)))
     here = [mechanism.primary.index(x) for x in again.primary]
     back = [again.secondary.index(x) for x in mechanism.secondary]
-    found = secondary_rates(again, state.T_world_base, state.q[:, order], rates[:, here])
-    expected = secondary_rates(mechanism, state.T_world_base, state.q, rates)
+    found = solve_rates(again, state.T_world_base, state.q[:, order], rates[:, here])
+    expected = solve_rates(mechanism, state.T_world_base, state.q, rates)
     np.testing.assert_allclose(found.values[:, back], expected.values, rtol=1e-9, atol=1e-9)
     values = least_values(again, state.T_world_base, state.q[:, order])
     np.testing.assert_allclose(
@@ -238,8 +238,8 @@ def test_jax_arrays_get_the_same_verdicts_and_values() -> None:
     mechanism = sk.closed_mechanism(robot)
     state = postures(robot, 20, 6)
     p = np.random.default_rng(7).uniform(-1, 1, (20, len(mechanism.primary)))
-    expected = secondary_rates(mechanism, state.T_world_base, state.q, p)
-    found = secondary_rates(mechanism, *map(jnp.asarray, (state.T_world_base, state.q, p)))
+    expected = solve_rates(mechanism, state.T_world_base, state.q, p)
+    found = solve_rates(mechanism, *map(jnp.asarray, (state.T_world_base, state.q, p)))
     np.testing.assert_array_equal(found.singular, expected.singular)
     assert expected.singular.any()
     np.testing.assert_allclose(found.values, expected.values, rtol=1e-6, atol=1e-6)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from screwkin.algebra.se3 import pose_from_array, unstack
-from screwkin.mechanism.network import coupling_twists, network_matrix
+from screwkin.mechanism.network import coupling_twists, network_of_twists
 from screwkin.mechanism.rates import block_rows
 from screwkin.mechanism.scaling import referenced
 
@@ -13,7 +13,7 @@ from screwkin.mechanism.scaling import referenced
 def network_of(mechanism, state):
     """N (B, rows, couplings) of a flat batch."""
     twists = coupling_twists(mechanism, pose_from_array(state.T_world_base).R, unstack(state.q))
-    return network_matrix(mechanism, twists, np.shape(state.q)[:-1])
+    return network_of_twists(mechanism, twists, np.shape(state.q)[:-1])
 
 
 def blocks_of(mechanism, N):

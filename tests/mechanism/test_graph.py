@@ -9,7 +9,13 @@ from hypothesis import strategies as st
 
 import screwkin as sk
 from screwkin.algebra.pattern import components
-from screwkin.mechanism.graph import Graph, circuit_matrix, cut_set_matrix, incidence_matrix, spanning_tree
+from screwkin.mechanism.graph import (
+    CouplingGraph,
+    circuit_matrix,
+    cut_set_matrix,
+    incidence_matrix,
+    spanning_tree,
+)
 from screwkin.model.table import load_robot
 from tests.kinematics.machines import random_mechanism
 
@@ -25,7 +31,7 @@ def graphs(draw):
     flips = draw(st.lists(st.booleans(), min_size=len(ends), max_size=len(ends)))
     order = draw(st.permutations(range(len(ends))))
     edges = [(f"e{k}", *(f"v{i}" for i in (ends[k][::-1] if flips[k] else ends[k]))) for k in order]
-    return Graph(tuple(f"v{i}" for i in range(n)), tuple(edges))
+    return CouplingGraph(tuple(f"v{i}" for i in range(n)), tuple(edges))
 
 
 @given(graph=graphs())
@@ -64,7 +70,7 @@ def test_walking_a_circuit_leads_back_to_where_it_began(graph):
 
 
 def test_a_triangle_has_the_circuit_that_one_sees():
-    graph = Graph(("a", "b", "c"), (("ab", "a", "b"), ("bc", "b", "c"), ("ac", "a", "c")))
+    graph = CouplingGraph(("a", "b", "c"), (("ab", "a", "b"), ("bc", "b", "c"), ("ac", "a", "c")))
     np.testing.assert_array_equal(circuit_matrix(graph), [[1, 1, -1]])
     np.testing.assert_array_equal(cut_set_matrix(graph), [[1, 0, 1], [0, 1, 1]])
 

@@ -8,7 +8,7 @@ import pytest
 import screwkin as sk
 from screwkin.mechanism.closure import close_loops
 from screwkin.mechanism.integrate import integrate_rates
-from screwkin.mechanism.rates import secondary_rates
+from screwkin.mechanism.rates import solve_rates
 from screwkin.model.table import load_robot
 
 
@@ -42,7 +42,7 @@ def drift():
 
     def rates(t, q):
         qd = np.zeros(4)
-        found = secondary_rates(mechanism, np.eye(4), q, np.array([2 * np.pi])).values
+        found = solve_rates(mechanism, np.eye(4), q, np.array([2 * np.pi])).values
         qd[names.index("crank")] = 2 * np.pi
         for name, value in zip(mechanism.secondary, found, strict=True):
             qd[names.index(name)] = value

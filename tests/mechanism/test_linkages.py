@@ -154,7 +154,7 @@ def test_the_slider_follows_its_closed_form_and_its_derivatives_by_sympy(mechani
 
 
 def test_the_sliders_acceleration_is_the_second_derivative_by_sympy(mechanisms):
-    from screwkin.mechanism.rates import secondary_accelerations, secondary_rates
+    from screwkin.mechanism.rates import secondary_accelerations, solve_rates
 
     mechanism = mechanisms["slider-crank"]
     p = mechanism.robot.parameters
@@ -165,7 +165,7 @@ def test_the_sliders_acceleration_is_the_second_derivative_by_sympy(mechanisms):
     speed = 3.0
     rates = np.empty(4)
     rates[mechanism.primary_columns] = speed
-    rates[mechanism.secondary_columns] = secondary_rates(
+    rates[mechanism.secondary_columns] = solve_rates(
         mechanism, state.T_world_base, state.q, np.array([speed])
     ).values
     found = secondary_accelerations(mechanism, state.T_world_base, state.q, rates, np.array([0.0])).values

@@ -13,8 +13,8 @@ from screwkin.errors import InputError, UnknownNameError
 from screwkin.kinematics.status import Status
 from screwkin.mechanism.closure import close_loops, closure_errors
 from screwkin.mechanism.least_values import least_values
-from screwkin.mechanism.network import coupling_twists, network_matrix, twist_rates
-from screwkin.mechanism.rates import secondary_accelerations, secondary_rates
+from screwkin.mechanism.network import coupling_twists, network_of_twists, twist_rates
+from screwkin.mechanism.rates import secondary_accelerations, solve_rates
 from tests.kinematics.machines import random_mechanism
 
 seeds = st.integers(0, 10_000)
@@ -53,9 +53,9 @@ def test_differences_of_closed_positions_are_the_rates_and_accelerations(seed):
     second = (-x[0] + 16 * x[1] - 30 * x[2] + 16 * x[3] - x[4]) / (12 * STEP**2)
 
     T, q = solution.state.T_world_base[2], solution.state.q[2]
-    N = network_matrix(mechanism, coupling_twists(mechanism, pose_from_array(T).R, q))
+    N = network_of_twists(mechanism, coupling_twists(mechanism, pose_from_array(T).R, q))
     assert np.abs(N @ rates).max() < 1e-6
-    found = secondary_rates(mechanism, T, q, speed)
+    found = solve_rates(mechanism, T, q, speed)
     assert not found.singular.any()
     np.testing.assert_allclose(found.values, rates[mechanism.secondary_columns], atol=1e-6)
 
@@ -106,7 +106,7 @@ def test_the_closure_error_of_an_open_loop_shrinks_to_first_order_by_the_closing
     fixed = pose_from_array(np.eye(4))
     q = [x[mechanism.position[name]] for name in mechanism.robot.joint_names]
     twists = coupling_twists(mechanism, UNTURNED, q)
-    C = network_matrix(mechanism, twists, circuits=mechanism.closing_matrix)
+    C = network_of_twists(mechanism, twists, circuits=mechanism.closing_matrix)
     missing = as_array(closure_errors(mechanism, unstack(x + dx), fixed)).reshape(-1)
     np.testing.assert_allclose(missing, -C @ dx, atol=2e-11)
 

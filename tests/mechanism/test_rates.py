@@ -8,7 +8,7 @@ import pytest
 import screwkin as sk
 from screwkin.errors import InputError, ShapeError
 from screwkin.kinematics.status import Status
-from screwkin.mechanism.rates import block_name, secondary_rates
+from screwkin.mechanism.rates import block_name, solve_rates
 from screwkin.model.table import load_robot
 from tests.kinematics.machines import planar_arm, spherical_wrist
 
@@ -102,7 +102,7 @@ def test_a_singular_limb_is_solved_as_well_as_it_can_and_spares_the_others(biolo
     base, tips = motion()
     primary = sk.virtual_motion(mechanism, state, base, tips)
     N = sk.network_matrix(mechanism, state)
-    solution = secondary_rates(mechanism, state.T_world_base, state.q, primary)
+    solution = solve_rates(mechanism, state.T_world_base, state.q, primary)
     np.testing.assert_array_equal(np.argwhere(solution.singular), [[2, 0]])
     full = np.empty((6, 48))
     full[:, mechanism.primary_columns], full[:, mechanism.secondary_columns] = primary, solution.values

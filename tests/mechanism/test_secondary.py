@@ -8,7 +8,7 @@ import pytest
 import screwkin as sk
 from screwkin.compiler.run import run
 from screwkin.errors import SingularError
-from screwkin.mechanism.rates import CERTIFIED, secondary_rates
+from screwkin.mechanism.rates import CERTIFIED, solve_rates
 from screwkin.mechanism.secondary import secondary_program
 from tests.compiler.robots import with_leg
 from tests.ik.legs import random_parallel_leg, random_spherical_leg
@@ -39,7 +39,7 @@ def test_rates_are_those_of_the_network_matrix(name, exchanged):
     primary = np.random.default_rng(6).uniform(-1, 1, (300, len(mechanism.primary)))
     N = network_of(mechanism, state)
     expected, sigma = davies(mechanism, N, primary), least_values_of(mechanism, N)
-    solution = secondary_rates(mechanism, state.T_world_base, state.q, primary)
+    solution = solve_rates(mechanism, state.T_world_base, state.q, primary)
     assert not solution.singular.any()
     size = np.abs(expected).max(axis=1, keepdims=True) / sigma.min(axis=1, keepdims=True)
     assert (np.abs(solution.values - expected) <= 1e-12 * np.maximum(size, 1.0)).all()
@@ -59,7 +59,7 @@ def test_legs_with_any_axes_follow(leg):
     primary = np.random.default_rng(24).uniform(-1, 1, (300, len(mechanism.primary)))
     N = network_of(mechanism, state)
     expected, sigma = davies(mechanism, N, primary), least_values_of(mechanism, N)
-    solution = secondary_rates(mechanism, state.T_world_base, state.q, primary)
+    solution = solve_rates(mechanism, state.T_world_base, state.q, primary)
     assert not solution.singular.any()
     size = np.abs(expected).max(axis=1, keepdims=True) / sigma.min(axis=1, keepdims=True)
     assert (np.abs(solution.values - expected) <= 1e-12 * np.maximum(size, 1.0)).all()

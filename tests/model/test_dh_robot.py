@@ -5,7 +5,7 @@ import pytest
 
 from screwkin.algebra.se3 import as_array
 from screwkin.errors import InputError, TableError
-from screwkin.kinematics.positions import frame_pose, link_displacements
+from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.model.dh_csv import load_dh, parse_dh
 from screwkin.model.dh_robot import robot_from_dh
 from screwkin.model.library import data_folder
@@ -33,8 +33,8 @@ def test_the_papers_table_becomes_a_robot_that_moves_as_the_bundled_one():
     displaced, expected = link_displacements(robot, list(q.T)), link_displacements(bundled, list(q.T))
     for tip in robot.tip_names:
         np.testing.assert_allclose(
-            as_array(frame_pose(robot, displaced, tip)),
-            as_array(frame_pose(bundled, expected, tip)),
+            as_array(pose_in_base(robot, displaced, tip)),
+            as_array(pose_in_base(bundled, expected, tip)),
             rtol=0,
             atol=1e-14,
         )
@@ -48,7 +48,7 @@ def test_chains_that_begin_with_the_same_joint_share_it():
     q = np.random.default_rng(2).uniform(-1, 1, (50, 3))
     displaced = link_displacements(robot, list(q.T))
     for table, columns in ((left, [0, 1]), (right, [0, 2])):
-        found = as_array(frame_pose(robot, displaced, table.tip))
+        found = as_array(pose_in_base(robot, displaced, table.tip))
         np.testing.assert_allclose(found, fk_by_matrices(table, q[:, columns]), rtol=0, atol=1e-15)
 
 

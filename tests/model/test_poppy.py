@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from screwkin.algebra.se3 import as_array
-from screwkin.kinematics.mass import center_of_mass
+from screwkin.kinematics.mass import mass_center
 from screwkin.kinematics.positions import (
     chain_jacobian,
-    frame_pose,
     link_displacements,
+    pose_in_base,
     successive_displacement,
 )
 from screwkin.model.dh import DHTable, screws_from_dh
@@ -110,8 +110,8 @@ def bent(height: float) -> list[float]:
 def test_the_centre_of_mass_lies_where_the_masses_put_it_not_in_the_waist(robot):
     """0.239 m above the sole when the waist is at 0.43 m, the height that the paper calls the CoM's."""
     displacements = link_displacements(robot, bent(0.43))
-    assert as_array(frame_pose(robot, displacements, "left_foot"))[2, 3] == pytest.approx(-0.43, abs=1e-12)
-    assert 0.43 + center_of_mass(robot, displacements).z == pytest.approx(0.239, abs=5e-4)
+    assert as_array(pose_in_base(robot, displacements, "left_foot"))[2, 3] == pytest.approx(-0.43, abs=1e-12)
+    assert 0.43 + mass_center(robot, displacements).z == pytest.approx(0.239, abs=5e-4)
 
 
 def test_at_home_knees_are_bent_and_soles_are_flat_on_the_floor(robot):
@@ -120,7 +120,7 @@ def test_at_home_knees_are_bent_and_soles_are_flat_on_the_floor(robot):
     np.testing.assert_allclose(home.q, bent(0.41), atol=1e-12)
     displacements = link_displacements(robot, home.q)
     for tip, y in zip(robot.tip_names, (0.048, -0.048), strict=True):
-        T = as_array(frame_pose(robot, displacements, tip))
+        T = as_array(pose_in_base(robot, displacements, tip))
         np.testing.assert_allclose(T[:3, :3], np.eye(3), atol=1e-15)
         np.testing.assert_allclose(T[:3, 3], [0, y, -0.41], atol=1e-15)
     for joint, q in zip(robot.joints, home.q, strict=True):
