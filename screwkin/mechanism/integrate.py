@@ -1,7 +1,7 @@
 """Plain integration of secondary rates: what positions drift to when the loops are not closed again.
 
 Kept to show the drift (Euler at 10 ms: millimetres of loop closure in a few steps); positions of a walk come
-from ``ik.loops``.
+from ``ik.pose``.
 """
 
 from __future__ import annotations
