@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -20,11 +20,12 @@ from screwkin.algebra.se3 import (
 from screwkin.compiler.records import identifier
 from screwkin.compiler.run import run
 from screwkin.dynamics.support import sole_corners
-from screwkin.errors import InputError
+from screwkin.errors import InputError, LimitError
 from screwkin.gait.plan import Plan
 from screwkin.gait.stance import LEFT, RIGHT, Foot, Hand, Stance
 from screwkin.ik.pose import solve_pose
 from screwkin.ik.pose_solution import PoseSolution
+from screwkin.kinematics.limits import LIMIT_TOLERANCE
 from screwkin.kinematics.positions import frame_pose, link_displacements
 from screwkin.mechanism.least_values import least_values
 from screwkin.mechanism.mechanism import Mechanism
@@ -100,7 +101,40 @@ def positions(robot: Robot, mechanism: Mechanism, made: Plan, guess: Array | Non
     targets = {"base": made.T_world_base, **_targets(robot, mechanism, made)}
     solution = solve_pose(robot, targets, State(made.T_world_base, start))
     solution.raise_on_failure(robot, made.time)
+    _refuse_jumps(robot, targets, solution.state.q, start, made.time)
     return solution
+
+
+JUMP = 1.0
+"""Joint step [rad] from sample to sample that only another branch of a limb can make."""
+
+
+def _refuse_jumps(robot: Robot, targets: dict[str, Array], q: Array, start: Array, time: Array) -> None:
+    """Refuse a motion that stays inside the limits only by another branch of a limb.
+
+    Raises:
+        LimitError: names limb, sample and time of the branch that is nearest to where the motion comes from.
+    """
+    before = np.vstack([np.atleast_2d(start)[:1], q[:-1]])
+    turning = [joint.type == "revolute" for joint in robot.joints]
+    jumps = np.flatnonzero((np.abs(q - before)[:, turning] > JUMP).any(axis=1))
+    if not len(jumps):
+        return
+    k = int(jumps[0])
+    free = tuple(replace(joint, lower=-np.inf, upper=np.inf) for joint in robot.joints)
+    here = {name: target[k] for name, target in targets.items()}
+    nearest = solve_pose(replace(robot, joints=free), here, State(targets["base"][k], before[k]))
+    for name in nearest.limbs:
+        joints = list(robot.path_to(robot.limb(name).link))
+        for joint, x in ((robot.joints[i], float(nearest.state.q[i])) for i in joints):
+            if not joint.lower - LIMIT_TOLERANCE <= x <= joint.upper + LIMIT_TOLERANCE:
+                at = ", ".join(f"{np.degrees(value):.1f}" for value in (joint.lower, joint.upper))
+                raise LimitError(
+                    f"{name}, sample {k} (t = {float(time[k]):.3f} s): {joint.name} at"
+                    f" {np.degrees(x):.1f} deg, limits {at} deg; only another branch of the limb is within the limits",
+                    name,
+                    k,
+                )
 
 
 def _targets(robot: Robot, mechanism: Mechanism, made: Plan) -> dict[str, Array]:
