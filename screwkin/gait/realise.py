@@ -131,7 +131,8 @@ def _refuse_jumps(robot: Robot, targets: dict[str, Array], q: Array, start: Arra
                 at = ", ".join(f"{np.degrees(value):.1f}" for value in (joint.lower, joint.upper))
                 raise LimitError(
                     f"{name}, sample {k} (t = {float(time[k]):.3f} s): {joint.name} at"
-                    f" {np.degrees(x):.1f} deg, limits {at} deg; only another branch of the limb is within the limits",
+                    f" {np.degrees(x):.1f} deg, limits {at} deg;"
+                    " only another branch of the limb is within the limits",
                     name,
                     k,
                 )
