@@ -70,7 +70,8 @@ def solve_limb(
             raise InputError(
                 "method closed needs poses (..., 4, 4); positions (..., 3) of this limb need a numeric method"
             )
-        closed_form(chain, position)
+        if not recognised(chain, position):
+            closed_form(chain, position)  # it says why there is none
         return closed_solutions(chain, target, guess, batch, settings.tolerances, nearest)
     if method == "hybrid" and position:
         raise InputError("method hybrid needs poses (..., 4, 4); positions (..., 3) need another method")

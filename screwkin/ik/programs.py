@@ -65,7 +65,7 @@ def wrapped(chain: SerialChain, q: Sequence[Scalar]) -> list[Scalar]:
 
 
 @cached
-def limb_branches(chain: SerialChain, position: bool = False) -> Program:
+def limb_branches(chain: SerialChain, position: bool) -> Program:
     """All solutions of a limb's closed form, in the order of ``ik.solutions.ordered``."""
     form = recognised(chain, position)
     assert form is not None
@@ -127,7 +127,7 @@ def _sorted(rows: Sequence[list[Scalar]]) -> list[list[Scalar]]:
 
 
 @cached
-def limb_pose(chain: SerialChain, position: bool = False) -> Program:
+def limb_pose(chain: SerialChain, position: bool) -> Program:
     """The one solution of a limb that ``solve_pose`` takes, for a target in the world."""
     recorder = Recorder(
         identifier(chain.limb, "pose", "position" if position else "pose"),

@@ -33,7 +33,7 @@ class Argument:
     name: str
     label: str
     shape: tuple[int, ...]
-    check_rigid: bool = False
+    rigid: bool = False
     of: str = ""
 
 

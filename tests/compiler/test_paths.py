@@ -16,8 +16,9 @@ from screwkin.compiler.run import chosen_path, python_function, run
 from screwkin.compiler.series import TURNS
 from screwkin.dynamics.newton_euler import GRAVITY
 from screwkin.dynamics.quantities import balance
-from screwkin.ik import programs as limbs
+from screwkin.ik.closed import recognised
 from screwkin.kinematics import body
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.tip_motion import follows, motion_program
 from tests.kinematics.machines import random_state, random_tree
 
@@ -241,5 +242,6 @@ def test_six_and_three_joint_limbs_alone_are_followed():
     assert follows(bioloid, mechanism.secondary)
     assert not follows(bioloid, mechanism.secondary[1:])
     assert not follows(random_tree(1), random_tree(1).joint_names)
-    assert limbs.solvable(bioloid, "left_hand", False)
-    assert not limbs.solvable(bioloid, "left_hand", True)
+    arm = SerialChain.of(bioloid, "left_hand")
+    assert recognised(arm, position=True)
+    assert not recognised(arm)
