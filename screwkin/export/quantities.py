@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from screwkin.compiler.program import Program
 from screwkin.dynamics.quantities import balance, ground_wrench, inverse_dynamics, mass_matrix, momentum
 from screwkin.errors import UnknownNameError
-from screwkin.ik.programs import limb_programs
+from screwkin.ik.programs import limb_programs_of
 from screwkin.kinematics.body import (
     center_of_mass,
     com_jacobian,
@@ -18,7 +18,6 @@ from screwkin.kinematics.body import (
     tip_poses,
 )
 from screwkin.kinematics.formula import Quantity
-from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.choice import closed_mechanism
 from screwkin.mechanism.network import coupling_screws
 from screwkin.mechanism.quantities import network_matrix, virtual_motion
@@ -50,17 +49,13 @@ QUANTITIES: Mapping[str, Quantity] = {
 """Every quantity that a formula defines. A new one needs its definition and its row here."""
 
 
-def _limbs(robot: Robot) -> list[Program]:
-    return [p for limb in robot.limbs for p in limb_programs(SerialChain.of(robot, limb.name))]
-
-
 def _rates(robot: Robot) -> list[Program]:
     return [secondary_program(robot, *closed_mechanism(robot).choice)]
 
 
 ALGORITHMS: Mapping[str, Callable[[Robot], list[Program]]] = {
-    "limb_ik": _limbs,
-    "solve_pose": _limbs,
+    "limb_ik": limb_programs_of,
+    "solve_pose": limb_programs_of,
     "secondary_rates": _rates,
 }
 """Functions that are more than a formula, and the programs in them: these can be prepared too."""

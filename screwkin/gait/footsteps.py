@@ -13,7 +13,7 @@ from screwkin.errors import Fault, GaitError
 from screwkin.gait.motion import Motion, along
 from screwkin.gait.path import path_of
 from screwkin.gait.record import Gait
-from screwkin.gait.splines import clamped_cubic, extremes, held, minimum_jerk
+from screwkin.gait.splines import clamped_cubic, extremes, held_constant, minimum_jerk
 from screwkin.gait.stance import LEFT, RIGHT, Stance
 
 _BELOW = 1e-9  # m: what rounding may put below the floor
@@ -94,7 +94,7 @@ def swing_splines(gait: Gait) -> tuple[Any, Any]:
             faults.append(Fault("[channel.foot_height]", "value", found, fix))
     if faults:
         raise GaitError(gait.path or f"gait {gait.name}", faults)
-    return held(progress), held(height)
+    return held_constant(progress), held_constant(height)
 
 
 def feet_motion(

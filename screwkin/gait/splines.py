@@ -47,7 +47,7 @@ def minimum_jerk(at: Array, value: Array) -> Any:
     return PPoly(np.stack([6 * rise / h**5, -15 * rise / h**4, 10 * rise / h**3, none, none, y[:-1]]), x)
 
 
-def held(spline: Any) -> Any:
+def held_constant(spline: Any) -> Any:
     """The spline of a swing, constant before its first and after its last key point, on [0, 1]."""
     from scipy.interpolate import PPoly
 

@@ -72,11 +72,11 @@ def _certified(
     chain = form.chain
     q, error, valid = solve_closed(form, target, guess, least_squares)
     for k in range(q.shape[1]):
-        q[:, k] = np.where(valid[:, k, None], held(chain, q[:, k], target, tolerances), q[:, k])
+        q[:, k] = np.where(valid[:, k, None], on_limits(chain, q[:, k], target, tolerances), q[:, k])
     return ordered(chain, "closed", q, valid, error, np.ones(valid.shape, dtype=int), guess, (len(q),))
 
 
-def held(chain: SerialChain, q: Array, target: Array, tolerances: tuple[float, float]) -> Array:
+def on_limits(chain: SerialChain, q: Array, target: Array, tolerances: tuple[float, float]) -> Array:
     """Positions (B, n) with those beyond their limits put on them, where the tip stays within tolerances.
 
     Args:
@@ -90,13 +90,13 @@ def held(chain: SerialChain, q: Array, target: Array, tolerances: tuple[float, f
         return q
     clipped = np.clip(q[at], chain.lower, chain.upper)
     lack, _ = residual(chain, clipped, target[at])
-    good = at[arrived(lack, tolerances)]
+    good = at[within_tolerances(lack, tolerances)]
     q = q.copy()
     q[good] = np.clip(q[good], chain.lower, chain.upper)
     return q
 
 
-def arrived(lack: Array, tolerances: tuple[float, float]) -> Array:
+def within_tolerances(lack: Array, tolerances: tuple[float, float]) -> Array:
     """(B,) bool: a residual (B, 6 or 3) is within both tolerances, angle [rad] and distance [m]."""
     turned, far = (np.linalg.norm(part, axis=1) for part in (lack[:, :-3], lack[:, -3:]))
     return np.asarray((turned <= tolerances[0]) & (far <= tolerances[1]))

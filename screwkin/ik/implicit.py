@@ -49,7 +49,7 @@ def limb_in_jax(
 
     def solve(target: Any, guess: Any) -> LimbSolutions:
         here = guess.shape[:-1]
-        return limbs.solve_arrays(chain, target, method, guess, settings, here, least_squares)
+        return limbs.solve_limb_arrays(chain, target, method, guess, settings, here, least_squares)
 
     def values(*inputs: Any) -> Values:
         solutions = solve(*map(np.asarray, inputs))
@@ -86,7 +86,7 @@ def pose_in_jax(
     def solve(*inputs: Any) -> PoseSolution:
         *tips, q = map(np.asarray, inputs)
         wanted = {name: poses.exact(f"targets[{name!r}]", x) for name, x in zip(names, tips, strict=True)}
-        return poses.solve_arrays(robot, wanted, q, q.shape[:-1], method, settings)
+        return poses.solve_whole_body(robot, wanted, q, q.shape[:-1], method, settings)
 
     def values(*inputs: Any) -> Values:
         solution = solve(*inputs)

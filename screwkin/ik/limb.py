@@ -9,7 +9,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.scalar import is_jax
 from screwkin.errors import InputError
-from screwkin.ik.methods import Method, solve_arrays
+from screwkin.ik.methods import Method, solve_limb_arrays
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.solutions import LimbSolutions
 from screwkin.kinematics.arrays import checked, one_batch
@@ -69,7 +69,7 @@ def limb_ik(
         from screwkin.ik.implicit import limb_in_jax
 
         return limb_in_jax(chain, target, method, start, settings, batch, least_squares)
-    return solve_arrays(chain, target, method, start, settings, batch, least_squares)
+    return solve_limb_arrays(chain, target, method, start, settings, batch, least_squares)
 
 
 def resting(robot: Robot, chain: SerialChain) -> Array:

@@ -19,7 +19,7 @@ from screwkin.algebra.singular_values import TRUSTED, Extremes, extreme_singular
 from screwkin.compiler.program import Program, Recorder, kept
 from screwkin.compiler.records import identifier
 from screwkin.ik.closed import closed_form
-from screwkin.ik.programs import cosines, wrapped
+from screwkin.ik.programs import cosines, wrapped_angles
 from screwkin.kinematics.limits import beyond
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.limb_motion import seen_from
@@ -99,7 +99,7 @@ def limb_map(robot: Robot, limb: str, guess: tuple[float, ...], length: float) -
 def _judged(chain: SerialChain, branch: Sequence[Scalar], near: Sequence[tuple[Scalar, Scalar]]) -> _Branch:
     """A branch (angles, slack) against the limits and the sines and cosines of the guess."""
     *angles, slack = branch
-    q = wrapped(chain, angles)
+    q = wrapped_angles(chain, angles)
     excess: Scalar = -FAR
     limit: Scalar = LIMITS
     for joint, x in enumerate(q):

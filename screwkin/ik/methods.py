@@ -21,7 +21,7 @@ from screwkin.model.state import RIGID
 Method = Literal["auto", "closed", "hybrid", "newton", "lm", "dls", "pinv"]
 
 
-def solve_arrays(
+def solve_limb_arrays(
     chain: SerialChain,
     target: Array,
     method: Method,

@@ -16,7 +16,7 @@ from screwkin.algebra.scalar import is_jax
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.pose_solution import PoseSolution
-from screwkin.ik.whole_body import PRECISE, Method, axes_of, exact, solve_arrays
+from screwkin.ik.whole_body import PRECISE, Method, axes_of, exact, solve_whole_body
 from screwkin.kinematics.arrays import checked, one_batch
 from screwkin.model.robot import Robot, refuse_closures
 from screwkin.model.state import State, home
@@ -79,6 +79,6 @@ def solve_pose(
 
         return pose_in_jax(robot, wanted, q, batch, method, settings)
     rigid = {name: exact(labels[name], a) for name, a in wanted.items()}
-    solution = solve_arrays(robot, rigid, q, batch, method, settings)
+    solution = solve_whole_body(robot, rigid, q, batch, method, settings)
     base = np.broadcast_to(wanted["base"], (*batch, 4, 4))
     return replace(solution, state=State(base, solution.state.q))

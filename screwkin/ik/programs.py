@@ -54,7 +54,7 @@ def cosines(q: Sequence[Scalar], near: Sequence[tuple[Scalar, Scalar]]) -> list[
     return [scalar.sin(x) * s + scalar.cos(x) * c for x, (s, c) in zip(q, near, strict=True)]
 
 
-def wrapped(chain: SerialChain, q: Sequence[Scalar]) -> list[Scalar]:
+def wrapped_angles(chain: SerialChain, q: Sequence[Scalar]) -> list[Scalar]:
     """Angles in (-pi, pi], or one turn off where only that is within the limits (``limits.wrapped``)."""
     angles = []
     for x, low, high in zip(q, chain.lower.tolist(), chain.upper.tolist(), strict=True):
@@ -80,7 +80,7 @@ def limb_branches(chain: SerialChain, position: bool) -> Program:
     near = _sines(_clipped(chain, recorder.input("guess", len(chain.names))))
     rows, certified = [], 1.0
     for *angles, slack in form.formula(target):
-        q = wrapped(chain, angles)
+        q = wrapped_angles(chain, angles)
         error = miss(chain, q, target)
         worst = _worst(chain, q)
         solves = error <= EXACT
@@ -250,7 +250,7 @@ def limb_programs(chain: SerialChain) -> list[Program]:
     return [make(chain, position) for position in kinds for make in (limb_branches, limb_pose)]
 
 
-def programs_of(robot: Robot) -> list[Program]:
+def limb_programs_of(robot: Robot) -> list[Program]:
     """The programs worth preparing for inverse kinematics: of every limb that has a closed form."""
     limbs = [] if robot.closures else [SerialChain.of(robot, limb.name) for limb in robot.limbs]
     programs = [program for chain in limbs for program in limb_programs(chain)]

@@ -48,7 +48,7 @@ def exact(name: str, target: Array) -> Array:
     return refuse_foreign(name, target) if deviation.size and deviation.max() > RIGID else poses
 
 
-def solve_arrays(
+def solve_whole_body(
     robot: Robot,
     targets: Mapping[str, Array],
     guess: Array,

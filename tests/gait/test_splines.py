@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from screwkin.gait.splines import clamped_cubic, cyclic_cubic, extremes, held, minimum_jerk
+from screwkin.gait.splines import clamped_cubic, cyclic_cubic, extremes, held_constant, minimum_jerk
 
 AT = np.array([0.1, 0.14, 0.2, 0.5, 0.8, 0.86, 0.89])
 UP = np.array([0.0, 0.1, 0.3, 1.0, 0.3, 0.1, 0.0])
@@ -45,7 +45,7 @@ def test_a_plateau_is_kept_by_resting_at_both_its_ends():
 
 @pytest.mark.parametrize("make", [clamped_cubic, minimum_jerk])
 def test_a_held_spline_is_exactly_constant_outside_its_swing(make):
-    spline = held(make(AT, UP + AT))
+    spline = held_constant(make(AT, UP + AT))
     before, after = np.linspace(0, 0.1, 11)[:-1], np.linspace(0.89, 1, 11)
     assert (spline(before) == UP[0] + AT[0]).all()
     assert np.ptp(spline(after)) == 0

@@ -11,7 +11,7 @@ import screwkin as sk
 from screwkin.compiler.run import compile_program
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.pose_solution import PoseSolution
-from screwkin.ik.programs import programs_of
+from screwkin.ik.programs import limb_programs_of
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.kinematics.status import Status
 from tests.laws.limbs import at, inside, random_robot, slid, targets_at
@@ -58,7 +58,7 @@ def test_a_prepared_robot_gives_the_same_answers(name: str) -> None:
     q = inside(robot, 300, 2)
     targets, leg = targets_at(robot, q), robot.limbs[0]
     before, branches = solved(robot, targets), sk.limb_ik(robot, leg.name, targets_at(robot, q)[leg.tip])
-    for program in programs_of(robot):
+    for program in limb_programs_of(robot):
         compile_program(program)
     after, same = solved(robot, targets), sk.limb_ik(robot, leg.name, targets[leg.tip])
     np.testing.assert_array_equal(after.status, before.status)
