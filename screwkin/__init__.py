@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from screwkin.model.library import robot_names
     from screwkin.model.robot import Robot
     from screwkin.model.state import State, home
-    from screwkin.model.table import load_robot
+    from screwkin.model.table import load_robot, robot_from_text
     from screwkin.trajectory import Trajectory, load_trajectory
 
 _HOMES = {
@@ -55,7 +55,7 @@ _HOMES = {
     "model.library": "robot_names",
     "model.robot": "Robot",
     "model.state": "State home",
-    "model.table": "load_robot",
+    "model.table": "load_robot robot_from_text",
     "trajectory": "Trajectory load_trajectory",
 }
 _HOME_OF = {name: f"screwkin.{module}" for module, names in _HOMES.items() for name in names.split()}
@@ -89,6 +89,7 @@ __all__ = [
     "momentum",
     "network_matrix",
     "prepare",
+    "robot_from_text",
     "robot_names",
     "secondary_rates",
     "singularity_report",

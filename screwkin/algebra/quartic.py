@@ -21,7 +21,7 @@ _LOOKS = np.arange(16) * (np.pi / 8)
 def circle_roots(a0: Array, a1: Array, b1: Array, a2: Array, b2: Array) -> Array:
     """Angles (4, B) of the four roots, each of which may be double.
 
-    Complex roots are told by the real part of their half-angle's tangent: for a pair close to the real axis
+    Complex roots are given by the real part of their half-angle's tangent: for a pair close to the real axis
     (a double root that rounding has split) that is the root, for others the caller finds that it is none.
 
     The half-angle is counted from the place opposite to where the function is largest, so that the leading

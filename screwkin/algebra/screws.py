@@ -177,7 +177,7 @@ def turn(rotation: Rotation, twist: Twist) -> Twist:
 
 
 def at(point: Vector, twist: Twist) -> Twist:
-    """The same motion told at another point: [omega; velocity of the body's point there]."""
+    """The same motion at another point: [omega; velocity of the body's point there]."""
     return Twist(twist.omega, twist.v + cross(twist.omega, point))
 
 
@@ -187,7 +187,7 @@ def wrench_at(point: Vector, wrench: Wrench) -> Wrench:
 
 
 def power(wrench: Wrench, twist: Twist) -> Scalar:
-    """Power of a wrench on a twist told at the same point [W]."""
+    """Power of a wrench on a twist, both at the same point [W]."""
     return plus(dot(wrench.m, twist.omega), dot(wrench.f, twist.v))
 
 

@@ -1,7 +1,7 @@
 """Comparison of inverse kinematics methods on one limb: over a walk, and over random poses inside the limits.
 
 The walk and the cold start are those of paper B's Table 5. What the paper leaves out (gains, damping, start,
-orientation tolerance, where the waist is) is chosen here and told with the results.
+orientation tolerance, where the waist is) is chosen here and given with the results.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class Entry:
     name: str
     method: Method
     settings: IkSettings
-    told: str
+    start: str
 
 
 @dataclass(frozen=True)
@@ -116,11 +116,11 @@ def ik_study(
         for i, entry in enumerate(entries):
             rows.append(measured(chain, data, target, entry))
             progress((k * total / len(sets) + i + 1) / total)
-        for i, (name, told, solve) in enumerate(OTHERS):
+        for i, (name, start, solve) in enumerate(OTHERS):
             some = target if data == "gait" else target[:OTHERS_POSES]
             outcome = solve(chain, some, entries[-1].settings)
             if outcome is not None:
-                rows.append(_row(chain, data, name, told, outcome, cap))
+                rows.append(_row(chain, data, name, start, outcome, cap))
             progress((k * total / len(sets) + len(entries) + i + 1) / total)
     return IkStudy(robot.name, chain.limb, tuple(rows), tuple(notes))
 
@@ -135,8 +135,8 @@ def fitting_entries(chain: SerialChain, cap: int) -> list[Entry]:
         entries.append(Entry("closed", "closed", base, f"{closed_form(chain).family}; all branches"))
     if _fits(spherical_variant, chain):
         for finish in ("newton", "lm", "dls", "pinv"):
-            told = f"{seed}; lambda 0.01" if finish == "dls" else seed
-            entries.append(Entry(f"hybrid-{finish}", "hybrid", replace(base, finish=finish), told))
+            start = f"{seed}; lambda 0.01" if finish == "dls" else seed
+            entries.append(Entry(f"hybrid-{finish}", "hybrid", replace(base, finish=finish), start))
     return [
         *entries,
         Entry("newton", "newton", base, f"{cold}; safeguarded"),
@@ -163,10 +163,10 @@ def measured(chain: SerialChain, data: str, target: Array, entry: Entry) -> IkRo
     found = solve_limb(chain, target, entry.method, start, entry.settings, (count,), nearest=False)
     seconds = time.perf_counter() - begin
     outcome = Outcome(found.best, found.valid[:, 0], found.iterations[:, 0], seconds)
-    return _row(chain, data, entry.name, entry.told, outcome, entry.settings.max_iterations)
+    return _row(chain, data, entry.name, entry.start, outcome, entry.settings.max_iterations)
 
 
-def _row(chain: SerialChain, data: str, name: str, told: str, outcome: Outcome, cap: int) -> IkRow:
+def _row(chain: SerialChain, data: str, name: str, start: str, outcome: Outcome, cap: int) -> IkRow:
     iterations = np.where(outcome.solved, outcome.iterations, cap)
     inside = outcome.solved & chain.within(chain.wrapped(outcome.q))
     return IkRow(
@@ -178,7 +178,7 @@ def _row(chain: SerialChain, data: str, name: str, told: str, outcome: Outcome, 
         float(inside.mean()),
         1e6 * outcome.seconds / len(outcome.q),
         len(outcome.q),
-        told,
+        start,
     )
 
 

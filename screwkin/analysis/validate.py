@@ -111,9 +111,19 @@ def validate(
         progress: called now and then with the share done.
         motion: what the joints do instead, as of servos that were measured; judged against the trajectory.
 
+    Returns:
+        Validation: ``passed``, ``reasons`` and what was measured.
+
     Raises:
         InputError: unknown engine, a trajectory of another robot, or compliance that the engine has not.
         MissingDependencyError: the engine is not installed.
+
+    Example:
+        >>> import screwkin as sk
+        >>> robot = sk.load_robot(sk.robot_names()[0])
+        >>> walk = sk.walk(robot, sk.load_gait("walk"), steps=1)
+        >>> sk.validate(robot, walk, "kinematic").passed        # perfect tracking proves nothing
+        False
     """
     _check_fit(robot, trajectory)
     rule, report = criteria or Criteria(), progress or (lambda share: None)

@@ -90,9 +90,9 @@ def _prelude(real: Real) -> str:
     single = (3.140625, math.pi - 3.140625)  # pi as HALF_TURN has it, the first with 8 bits
     high, low = map(_number, HALF_TURN if real == "double" else single)
     widths = "\n".join(
-        f"#elif defined({told})\n#define BYTES {width}\n"
+        f"#elif defined({macro})\n#define BYTES {width}\n"
         f"#define EACH(F) {{{', '.join(f'F({i})' for i in range(width // size))}}}"
-        for told, width in _BYTES
+        for macro, width in _BYTES
     )
     return f"""#ifdef __FAST_MATH__
 #error "-ffast-math takes the rounding out of these functions; -O2 -ffp-contract=fast does what can be done"
@@ -288,9 +288,9 @@ class _Body:
             else:
                 self._write(x, *place)
         for value, step in enumerate(program.steps, program.arity):
-            told = self._expression(step)
+            value_text = self._expression(step)
             kind = "mask" if value in self._masks else "pack"
-            self.lines.append(f"const {kind} v{value} = {told};")
+            self.lines.append(f"const {kind} v{value} = {value_text};")
             for place in wanted.get(value, ()):
                 self._write(value, *place)
 

@@ -49,11 +49,11 @@ def source(program: Program) -> str:
         text.update({at + k: name for k, name in enumerate(names)})
         at += group.size
 
-    def told(x: Operand) -> str:
+    def written(x: Operand) -> str:
         return text[x] if isinstance(x, int) else repr(x)
 
     for k, step in enumerate(program.steps):
-        operands = [told(x) for x in step.operands]
+        operands = [written(x) for x in step.operands]
         form = _TEXT.get(step.operation, step.operation + "({}" + ", {}" * (len(operands) - 1) + ")")
         value, deep = (
             form.format(*operands),
@@ -66,7 +66,7 @@ def source(program: Program) -> str:
             lines.append(f"    v{at + k} = {value}")
             text[at + k] = f"v{at + k}"
     results = iter(program.results)
-    lists = [f"[{', '.join(told(next(results)) for _ in range(group.size))}]" for group in program.outputs]
+    lists = [f"[{', '.join(written(next(results)) for _ in range(group.size))}]" for group in program.outputs]
     lines.append(f"    return {', '.join(lists)}" + ("," if len(lists) == 1 else ""))
     return "\n".join(lines) + "\n"
 

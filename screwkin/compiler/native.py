@@ -193,8 +193,8 @@ def _build(text: str, cc: str, flags: tuple[str, ...], library: Path) -> None:
     with atomic_path(library) as beside:
         ends = [*flags, "-x", "c", "-o", str(beside), "-", "-lm"]
         for tuned in (TUNED, ()):
-            told = [cc, *FLAGS, *tuned, *ends]
-            done = subprocess.run(told, input=text, text=True, capture_output=True, timeout=300)
+            command = [cc, *FLAGS, *tuned, *ends]
+            done = subprocess.run(command, input=text, text=True, capture_output=True, timeout=300)
             if not done.returncode:
                 return
         done.check_returncode()

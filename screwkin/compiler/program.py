@@ -105,8 +105,8 @@ class Program:
     def digest(self) -> str:
         """A name for what the program is: equal for equal programs, in whatever process they were made."""
         steps = ((step.operation, step.operands) for step in self.steps)
-        told = (self.name, self.about, self.inputs, self.outputs, tuple(steps), self.results)
-        return digest(repr(told))
+        parts = (self.name, self.about, self.inputs, self.outputs, tuple(steps), self.results)
+        return digest(repr(parts))
 
     @property
     def operations(self) -> int:
@@ -172,8 +172,8 @@ class Recorder:
 
     def program(self) -> Program:
         """What has been recorded, without what no output needs."""
-        steps, told = _linear(self.graph, self._places, self._results)
-        return Program(self.name, self.about, tuple(self._inputs), tuple(self._outputs), steps, told)
+        steps, results = _linear(self.graph, self._places, self._results)
+        return Program(self.name, self.about, tuple(self._inputs), tuple(self._outputs), steps, results)
 
 
 def _linear(
@@ -198,5 +198,5 @@ def _linear(
         value[index] = len(places) + len(steps)
         operation = "atan2" if operation == "arc" else operation
         steps.append(Step(operation, tuple(value[x] if isinstance(x, int) else x[0] for x in operands)))
-    told = tuple(value[x.index] if isinstance(x, Node) else float(x) for x in results)
-    return tuple(steps), told
+    results = tuple(value[x.index] if isinstance(x, Node) else float(x) for x in results)
+    return tuple(steps), results

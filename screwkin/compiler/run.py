@@ -109,12 +109,12 @@ def _ways(program: Program) -> Mapping[str, Callable[[Sequence[Array], Sequence[
         function = python_function(program)
         for i, sample in enumerate(zip(*(array.tolist() for array in inputs), strict=True)):
             try:
-                told = function(*sample)
+                answer = function(*sample)
             except (ArithmeticError, ValueError):  # by Python; other paths give infinity or NaN
                 here = slice(i, i + 1)
                 emit_python.run_numpy(program, [a[here] for a in inputs], [a[here] for a in outputs])
                 continue
-            for array, values in zip(outputs, told, strict=True):
+            for array, values in zip(outputs, answer, strict=True):
                 array[i] = values
 
     def by_c(inputs: Sequence[Array], outputs: Sequence[Array]) -> None:

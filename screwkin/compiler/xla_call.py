@@ -39,8 +39,8 @@ def function(program: Program) -> Callable[..., tuple[Array, ...]]:
 
     def call(*inputs: Array) -> tuple[Array, ...]:
         batch = inputs[0].shape[: inputs[0].ndim - inner[0]]
-        told = [jax.ShapeDtypeStruct((*batch, *group.shape), np.float64) for group in program.outputs]
-        return tuple(jax.ffi.ffi_call(target, told, vmap_method="broadcast_all")(*inputs))
+        shapes = [jax.ShapeDtypeStruct((*batch, *group.shape), np.float64) for group in program.outputs]
+        return tuple(jax.ffi.ffi_call(target, shapes, vmap_method="broadcast_all")(*inputs))
 
     @jax.custom_jvp
     def compute(*inputs: Array) -> tuple[Array, ...]:
@@ -54,11 +54,11 @@ def function(program: Program) -> Callable[..., tuple[Array, ...]]:
         if any(jnp.result_type(x) != np.float64 for x in inputs):
             return plain(*inputs)
         batch = jnp.broadcast_shapes(*(x.shape[: x.ndim - n] for x, n in zip(inputs, inner, strict=True)))
-        told = [
+        arrays = [
             jnp.broadcast_to(x, (*batch, *group.shape))
             for x, group in zip(inputs, program.inputs, strict=True)
         ]
-        return compute(*told)
+        return compute(*arrays)
 
     chosen.__name__ = program.name
     return chosen
@@ -83,13 +83,13 @@ def _batch_first(program: Program) -> Callable[..., tuple[Array, ...]]:
     def compute(*inputs: Array) -> tuple[Array, ...]:
         inner = [len(group.shape) for group in program.inputs]
         batch = jnp.broadcast_shapes(*(x.shape[: x.ndim - n] for x, n in zip(inputs, inner, strict=True)))
-        told = []
+        arrays = []
         for x, group in zip(inputs, program.inputs, strict=True):
             whole = jnp.broadcast_to(x, (*batch, *group.shape)).reshape(math.prod(batch), *group.shape)
-            told.append(jnp.moveaxis(whole, 0, -1))
+            arrays.append(jnp.moveaxis(whole, 0, -1))
         return tuple(
             jnp.moveaxis(x, -1, 0).reshape(*batch, *group.shape)
-            for x, group in zip(last(*told), program.outputs, strict=True)
+            for x, group in zip(last(*arrays), program.outputs, strict=True)
         )
 
     compute.__name__ = program.name
@@ -98,7 +98,7 @@ def _batch_first(program: Program) -> Callable[..., tuple[Array, ...]]:
 
 @kept_with
 def _target(program: Program) -> str | None:
-    """The program's handler, compiled and told to XLA under a name that its text decides; None without."""
+    """The program's handler, compiled and registered with XLA under a name that its text decides; or None."""
     if not all(group.size for group in (*program.inputs, *program.outputs)):
         return None
     flags = (f"-I{jax.ffi.include_dir()}", "-D_DEFAULT_SOURCE")
@@ -129,7 +129,7 @@ def _definitions(program: Program) -> str:
 
     arrays = [f"(in)[{k}]" for k in range(len(program.inputs))]
     arrays += [f"(out)[{k}]" for k in range(len(program.outputs))]
-    told = {
+    definitions = {
         "INPUTS": len(program.inputs),
         "OUTPUTS": len(program.outputs),
         "SIZES_IN": sizes(program.inputs),
@@ -137,4 +137,4 @@ def _definitions(program: Program) -> str:
         "PROGRAM(samples, in, out)": f"{program.name}(samples, {', '.join(arrays)})",
         "HANDLER": f"{program.name}_xla",
     }
-    return "\n".join(f"#define {name} {value}" for name, value in told.items())
+    return "\n".join(f"#define {name} {value}" for name, value in definitions.items())

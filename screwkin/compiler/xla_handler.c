@@ -81,17 +81,17 @@ static size_t threads(const XLA_FFI_CallFrame *call)
     int64_t count = 1;
     XLA_FFI_ThreadPool_NumThreads_Args asked = {
         XLA_FFI_ThreadPool_NumThreads_Args_STRUCT_SIZE, NULL, call->ctx, &count};
-    const int told = succeeded(call->api, call->api->XLA_FFI_ThreadPool_NumThreads(&asked));
-    return told && count > 1 ? (size_t)count : 1;
+    const int known = succeeded(call->api, call->api->XLA_FFI_ThreadPool_NumThreads(&asked));
+    return known && count > 1 ? (size_t)count : 1;
 }
 
 XLA_FFI_Error *HANDLER(XLA_FFI_CallFrame *call)
 {
     static const size_t sizes[] = SIZES_OUT;
     if (call->extension_start && call->extension_start->type == XLA_FFI_Extension_Metadata) {
-        XLA_FFI_Metadata *told = ((XLA_FFI_Metadata_Extension *)call->extension_start)->metadata;
-        told->api_version.major_version = XLA_FFI_API_MAJOR;
-        told->api_version.minor_version = XLA_FFI_API_MINOR;
+        XLA_FFI_Metadata *metadata = ((XLA_FFI_Metadata_Extension *)call->extension_start)->metadata;
+        metadata->api_version.major_version = XLA_FFI_API_MAJOR;
+        metadata->api_version.minor_version = XLA_FFI_API_MINOR;
         return NULL;
     }
     Job one = {.api = call->api};

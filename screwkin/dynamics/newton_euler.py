@@ -1,7 +1,7 @@
 """Newton-Euler dynamics of a floating tree, as formulas over records.
 
-Everything is told in world axes about the base origin (a point fixed in the world where the base origin is
-at that instant), so numbers stay small wherever the robot stands. Base motion is told classically: twist
+Everything is in world axes about the base origin (a point fixed in the world where the base origin is at
+that instant), so numbers stay small wherever the robot stands. Base motion is given classically: twist
 [omega; v of the base origin] and its time derivative.
 """
 
@@ -57,7 +57,7 @@ def link_twists(bodies: Bodies, qd: Sequence[Scalar], base: Twist) -> dict[str, 
 def link_accelerations(
     bodies: Bodies, V: dict[str, Twist], qd: Sequence[Scalar], qdd: Sequence[Scalar], base: Twist
 ) -> dict[str, Twist]:
-    """Time derivative of every link's twist told at the fixed point (screw acceleration)."""
+    """Time derivative of every link's twist at the fixed point (screw acceleration)."""
     robot = bodies.robot
     v0 = V[robot.base_link]
     A = {robot.base_link: Twist(base.omega, base.v - cross(v0.omega, v0.v))}

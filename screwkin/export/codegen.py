@@ -105,21 +105,23 @@ def example(robot: Robot, program: Program) -> dict[str, Array]:
     home = np.array(posture.q if posture else [0.1] * len(robot.joints), dtype=float)
     q, T = home + rng.uniform(-0.1, 0.1, len(home)), np.eye(4)
     T[2, 3] = posture.base_height if posture else 0.0
-    told: dict[str, Array] = {
+    sample: dict[str, Array] = {
         "T_world_base": T,
         "q": q,
         "gravity": np.array([GRAVITY]),
         "zmp": T[:2, 3] + 0.01,
     }
-    told["stiffness"] = np.linspace(40.0, 80.0, len(home))
-    told["contact"] = np.ones(len({sole.limb for sole in robot.soles}))
+    sample["stiffness"] = np.linspace(40.0, 80.0, len(home))
+    sample["contact"] = np.ones(len({sole.limb for sole in robot.soles}))
     D = link_displacements(robot, q.tolist())
     for limb in robot.limbs:
         pose = as_array(pose_in_base(robot, D, limb.tip))
-        told[identifier("T_world", limb.tip)] = T @ pose
+        sample[identifier("T_world", limb.tip)] = T @ pose
         if program.name == identifier(robot.name, limb.name, "nearest"):
-            told |= {"T_base_tip": pose, "guess": home[list(SerialChain.of(robot, limb.name).joints)]}
-    return {g.name: told[g.name] if g.name in told else rng.uniform(-1, 1, g.shape) for g in program.inputs}
+            sample |= {"T_base_tip": pose, "guess": home[list(SerialChain.of(robot, limb.name).joints)]}
+    return {
+        g.name: sample[g.name] if g.name in sample else rng.uniform(-1, 1, g.shape) for g in program.inputs
+    }
 
 
 def _array(name: str, values: Array) -> str:

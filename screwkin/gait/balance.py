@@ -102,6 +102,13 @@ def zmp(robot: Robot, trajectory: Trajectory) -> Balance:
 
     Raises:
         InputError: the joints are not those of the robot, or a foot has no sole.
+
+    Example:
+        >>> import screwkin as sk
+        >>> robot = sk.load_robot(sk.robot_names()[0])
+        >>> balance = sk.zmp(robot, sk.walk(robot, sk.load_gait("walk"), steps=1))
+        >>> bool(balance.margin.min() > 0)
+        True
     """
     check_joints(robot, trajectory.joint_names)
     point, com, wrench, cart = ground_reaction(

@@ -26,9 +26,17 @@ def load_gait(name_or_path: str | Path) -> Gait:
     Args:
         name_or_path: such as ``"walk"`` or ``"my/gait.toml"``.
 
+    Returns:
+        The checked gait; ``replace`` sets its parameters.
+
     Raises:
         UnknownNameError: no such gait; the message lists the bundled ones.
         GaitError: the file cannot be read or is wrong; all faults are named at once.
+
+    Example:
+        >>> import screwkin as sk
+        >>> sk.load_gait("walk").replace(Tc=1.2).Tc
+        1.2
     """
     path = find_gait(name_or_path)
     return parse_gait(read_text(path, GaitError), str(path))

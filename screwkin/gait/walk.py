@@ -41,6 +41,13 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
     Raises:
         UnreachableError, SingularError, LimitError: names limb, sample and time.
         GaitError, InputError: the gait does not fit the robot.
+
+    Example:
+        >>> import screwkin as sk
+        >>> robot = sk.load_robot(sk.robot_names()[0])
+        >>> walk = sk.walk(robot, sk.load_gait("walk"), steps=1)
+        >>> bool(walk.margin.min() > 0)                 # the ZMP stays inside the support polygon
+        True
     """
     expect(robot, Robot, "robot", 'load_robot("NAME")')
     expect(gait, Gait, "gait", 'load_gait("NAME")')

@@ -5,7 +5,7 @@ joint only: seen from joint 2, it keeps its angle to that axis; seen from the fo
 motion about it changes where the last axis lies along it. That n is a unit vector is then one quartic in
 tan(q1/2), whether axes meet or not.
 
-Source: derived here; it is the subproblem 6 of Elias and Wen (2025), "IK-Geo", told by one direction.
+Source: derived here; it is the subproblem 6 of Elias and Wen (2025), "IK-Geo", by one direction.
 """
 
 from __future__ import annotations

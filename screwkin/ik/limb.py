@@ -55,6 +55,16 @@ def limb_ik(
         ShapeError: wrong shape, NaN or infinity.
         InputError: a pose that is none, an unknown method, or one that does not fit the limb (for
             ``"closed"`` the message says what the limb's geometry lacks); or the robot has closures.
+
+    Example:
+        >>> import numpy as np
+        >>> import screwkin as sk
+        >>> robot = sk.load_robot(sk.robot_names()[0])
+        >>> home = sk.home(robot)
+        >>> T_base_foot = sk.frame_pose(robot, sk.State(np.eye(4), home.q), "right_foot")
+        >>> legs = sk.limb_ik(robot, "right_leg", T_base_foot)
+        >>> legs.q.shape, bool(legs.valid[0])
+        ((8, 6), True)
     """
     if method not in get_args(Method):
         raise InputError(f"method is {method!r}; valid: {', '.join(get_args(Method))}")

@@ -55,6 +55,14 @@ def solve_pose(
         UnknownNameError: a target is no tip.
         ShapeError: wrong shape, NaN or infinity, a pose that is not rigid, or batches that do not fit.
         InputError: no tip has a target, an unknown method, or the robot has closures.
+
+    Example:
+        >>> import screwkin as sk
+        >>> robot = sk.load_robot(sk.robot_names()[0])
+        >>> T_world_foot = sk.frame_pose(robot, sk.home(robot), "right_foot")
+        >>> T_world_foot[2, 3] += 0.02                  # lift the foot by 20 mm
+        >>> sk.solve_pose(robot, {"right_foot": T_world_foot}).ok
+        True
     """
     if method not in get_args(Method):
         raise InputError(f"method is {method!r}; valid: {', '.join(get_args(Method))}")

@@ -107,7 +107,7 @@ def of_shape(name: str, array: Any, *shape: int) -> Array:
 
 
 def check_rigid(name: str, T: Array) -> Array:
-    """Checked poses (..., 4, 4) that are rigid displacements; JAX arrays, perhaps traced, are taken as told.
+    """Checked poses (..., 4, 4) that are rigid displacements; JAX arrays, perhaps traced, are not read.
 
     Raises:
         ShapeError: a matrix is no rigid displacement.

@@ -16,7 +16,7 @@ from screwkin.model.robot import Robot
 def successive_displacement(
     screws: Sequence[Screw], thetas: Sequence[Scalar], A_c_ref: Pose = IDENTITY, A_ref_k: Pose = IDENTITY
 ) -> Pose:
-    """Pose of frame k in frame c through a chain whose screws are told in a frame of free choice.
+    """Pose of frame k in frame c through a chain whose screws are expressed in a frame of free choice.
 
     ``A_c_ref`` and ``A_ref_k`` are the zero-pose transforms from c to that reference frame and from it to k.
 
@@ -29,7 +29,7 @@ def successive_displacement(
 
 
 def screws_in(frame: Pose, screws: Sequence[Screw]) -> list[Screw]:
-    """The same lines told in ``frame`` (given by its pose in their present frame)."""
+    """The same lines expressed in ``frame`` (given by its pose in their present frame)."""
     back = frame.inverse
     return [carry(back, screw) for screw in screws]
 
@@ -75,6 +75,6 @@ def pose_in_base(robot: Robot, displacements: Sequence[Displacement], name: str)
 def frame_jacobian(robot: Robot, twists: Sequence[Twist], name: str) -> dict[int, Twist]:
     """Twist of a frame per unit rate of each joint on its path: index of the joint to its column.
 
-    ``twists`` are those of ``joint_twists``; the columns are told where they are.
+    ``twists`` are those of ``joint_twists``; the columns are expressed where they are.
     """
     return {i: twists[i] for i in robot.path_to(robot.frame(name)[0])}

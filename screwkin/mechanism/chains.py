@@ -113,7 +113,7 @@ def chain_coordinates(chain: Sequence[str], pose: Pose, held: Pose = IDENTITY) -
 def chain_twists(chain: Sequence[str], R: Rotation, p: Vector) -> list[Twist]:
     """Normalised screws of the chain's couplings when they have turned its body by R and it stands at p.
 
-    World axes; p and the twists are told from the same point.
+    World axes; p and the twists are taken from the same point.
     """
     turning = [c for c in chain if c[0] == "r"]
     return chain_screws(chain, chain_coordinates(turning, Pose(R, ZERO)), p)

@@ -101,6 +101,12 @@ def closed_mechanism(robot: Robot, primary: Sequence[str] | None = None) -> Mech
             that is open at the home posture, where ranks would mean nothing.
         SingularError: the right number, but dependent; says which to exchange.
 
+    Example:
+        >>> import screwkin as sk
+        >>> mechanism = sk.closed_mechanism(sk.load_robot(sk.robot_names()[0]))
+        >>> len(mechanism.couplings), mechanism.mobility
+        (48, 24)
+
     Source: Davies (1981); paper A, eq. 9-11, 15.
     """
     expect(robot, Robot, "robot", 'load_robot("NAME")')

@@ -59,7 +59,7 @@ def cut_set_matrix(graph: CouplingGraph) -> Integers:
 
 
 def circuit_matrix(graph: CouplingGraph) -> Integers:
-    """Fundamental circuits (chords, edges), each told so that its first edge counts +1."""
+    """Fundamental circuits (chords, edges), each so that its first edge counts +1."""
     tree = list(spanning_tree(graph))
     chords = [i for i in range(len(graph.edges)) if i not in set(tree)]
     B = np.zeros((len(chords), len(graph.edges)), dtype=np.int64)

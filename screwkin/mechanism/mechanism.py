@@ -101,7 +101,7 @@ class Mechanism:
 
     @cached_property
     def closing_matrix(self) -> Integers:
-        """(closings, couplings) of -1, 0, 1: circuits told by what closes them, path a counting +1."""
+        """(closings, couplings) of -1, 0, 1: circuits by what closes them, path a counting +1."""
         C = np.zeros((len(self.closings), len(self.couplings)), dtype=np.int64)
         for row, closing in enumerate(self.closings):
             for sign, path in ((1, closing.path_a), (-1, closing.path_b)):
@@ -121,8 +121,8 @@ class Mechanism:
     def circuit_names(self) -> tuple[str, ...]:
         """What each circuit is called: its limb or closure, else the joints that it runs through."""
         tips = {chain.name: chain.limb.name for chain in self.chains if chain.limb}
-        told = list(zip(self.closings, self.closing_matrix, strict=True))
-        closures = {tuple(sign * row): closing.name for closing, row in told for sign in (1, -1)}
+        rows = list(zip(self.closings, self.closing_matrix, strict=True))
+        closures = {tuple(sign * row): closing.name for closing, row in rows for sign in (1, -1)}
         names = []
         for circuit, row in zip(self.circuits, self.circuit_matrix, strict=True):
             limbs = [tips[c.split(".")[0]] for c in circuit if c.split(".")[0] in tips]

@@ -1,7 +1,7 @@
 """Davies' network matrix: the circuits' screws, formed at a point that travels with the robot.
 
 Source: paper A, eq. 8-11 and 15. The circulation law N q' = 0 holds at any point; far from the robot
-the matrix loses digits (condition 1e2 at the waist, 2.5e5 at 50 m), so screws are told at the waist origin.
+the matrix loses digits (condition 1e2 at the waist, 2.5e5 at 50 m), so screws are taken at the waist origin.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def coupling_twists(
         mechanism: the closed mechanism.
         R: orientation of the base.
         q: joint positions in table order.
-        point: where the screws are told, from the base origin, world axes [m]. Where the robot stands does
+        point: where the screws are taken, from the base origin, world axes [m]. Where the robot stands does
             not enter: virtual translations have no place, virtual rotations pass through their body.
     """
     robot = mechanism.robot
@@ -94,7 +94,7 @@ def assembled(mechanism: Mechanism, S: Any, circuits: Integers | None = None) ->
 
 
 def twist_rates(mechanism: Mechanism, twists: Sequence[Twist], rates: Sequence[Scalar]) -> list[Twist]:
-    """Time derivative of every coupling's screw when all couplings move, told at the fixed point.
+    """Time derivative of every coupling's screw when all couplings move, at the fixed point.
 
     The link that bears a screw carries it: the derivative is the bracket of that link's twist with it.
     """

@@ -108,10 +108,10 @@ def _printed(part: SymbolicLimb, style: Style) -> str:
         rows.append(("origin", part.fk[:3, 3]))
         blocks.append(_heading("Pose of the tip in the base frame", 3, style))
         blocks.append(_vectors(["", "in base axes"], [(name, (v,)) for name, v in rows], write))
-        blocks.append(_heading("Screw Jacobian in base axes, told at the base origin", 3, style))
+        blocks.append(_heading("Screw Jacobian in base axes, at the base origin", 3, style))
         blocks.append(_screws(real, part.jacobian, write))
-    told = "the waist, waist upright" if "waist.px" in part.couplings else "the base origin"
-    blocks.append(_heading(f"Rows of the network matrix for this circuit, told at {told}", 3, style))
+    point = "the waist, waist upright" if "waist.px" in part.couplings else "the base origin"
+    blocks.append(_heading(f"Rows of the network matrix for this circuit, at {point}", 3, style))
     blocks.append(_screws(part.couplings, part.network_block, write))
     return "\n\n".join(blocks)
 
@@ -136,12 +136,12 @@ def _vectors(header: list[str], rows: Sequence[tuple[str, tuple[Any, ...]]], wri
     lines = []
     for name, vectors in rows:
         labels = header[1:] if len(vectors) > 1 else [""]
-        told = "  ".join(
+        text = "  ".join(
             f"{label} = {write.vector(v)}".removeprefix(" = ")
             for label, v in zip(labels, vectors, strict=True)
         )
-        if len(told) + width <= _WIDE:
-            lines.append(f"{name:<{width}}  {told}")
+        if len(text) + width <= _WIDE:
+            lines.append(f"{name:<{width}}  {text}")
             continue
         heads = iter([name])
         for label, v in zip(labels, vectors, strict=True):
@@ -206,12 +206,12 @@ class _Writer:
 
     def vector(self, v: Any) -> str:
         """Three scalars in parentheses, in LaTeX one below the other where they are long."""
-        told = [self._plain(c) for c in v]
+        text = [self._plain(c) for c in v]
         if self.style == "text":
-            return f"({', '.join(told)})"
-        if self.style == "latex" and sum(map(len, told)) > _WIDE:
-            return r"$\begin{pmatrix} " + r" \\ ".join(told) + r" \end{pmatrix}$"
-        return f"$({', '.join(told)})$"
+            return f"({', '.join(text)})"
+        if self.style == "latex" and sum(map(len, text)) > _WIDE:
+            return r"$\begin{pmatrix} " + r" \\ ".join(text) + r" \end{pmatrix}$"
+        return f"$({', '.join(text)})$"
 
     def _plain(self, x: Scalar) -> str:
         if not is_symbolic(x):
@@ -234,8 +234,8 @@ class _Writer:
         if all(n == 1 and q in self.short for q, n in parts.items()):
             names = sorted((self.short[q].removeprefix("q") for q in parts), key=lambda n: (len(n), n))
             return letter + ("".join(names) if all(len(n) == 1 for n in names) else ",".join(names))
-        told = angle.xreplace({q: type(q)(name) for q, name in self.short.items()})
-        return f"{type(wave).__name__}({told})"
+        text = angle.xreplace({q: type(q)(name) for q, name in self.short.items()})
+        return f"{type(wave).__name__}({text})"
 
 
 def _latex_name(name: str) -> str:

@@ -52,6 +52,12 @@ def singularity_report(mechanism: Mechanism, at: State | Array) -> tuple[LimbSin
     Returns:
         One entry for every block of secondary couplings. Singular values have no unit: screws are taken at
         the tip (of a loop: at the point nearest to its axes), velocities over ``characteristic_length``.
+
+    Example:
+        >>> import screwkin as sk
+        >>> mechanism = sk.closed_mechanism(sk.load_robot(sk.robot_names()[0]))
+        >>> any(entry.near for entry in sk.singularity_report(mechanism, sk.home(mechanism.robot)))
+        False
     """
     if isinstance(at, State):
         T, q = np.asarray(at.T_world_base, dtype=float), np.asarray(at.q, dtype=float)

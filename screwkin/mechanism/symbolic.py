@@ -35,7 +35,7 @@ class SymbolicLimb:
         fk: (4, 4) pose of the tip in the base frame; None for a loop.
         jacobian: (6, joints) in base axes, [omega; v at the base origin]; None for a loop.
         couplings: names of the columns of the network block.
-        network_block: (6, couplings) rows of the network matrix that belong to the limb's circuit, told at
+        network_block: (6, couplings) rows of the network matrix that belong to the limb's circuit, taken at
             the base origin with the base upright; virtual rotations are coordinates of their own.
         origin: symbols x, y, z of the tip's origin in the network block, for the last column of ``fk``.
     """
@@ -75,7 +75,7 @@ def symbolic_limb(robot: Robot, limb: str) -> SymbolicLimb:
     origin = origin_symbols(single)
     for chain in mechanism.chains:
         turning = [name for name in chain.names if name.split(".")[1][0] == "r"]
-        if chain.limb is None:  # the block is told for an upright waist
+        if chain.limb is None:  # the block is that of an upright waist
             virtual = chain_screws(chain.couplings, [0] * len(turning), ZERO)
         else:
             virtual = chain_screws(chain.couplings, [symbols[name] for name in turning], Vector(*origin))

@@ -52,13 +52,16 @@ def robot_from_text(text: str, name: str = "<text>", symbolic: bool = False) -> 
         name: where it comes from, for messages and for ``Robot.path``.
         symbolic: keep the table's parameters as sympy symbols; for TOML only.
 
+    Returns:
+        The checked robot, every length in [m], mass in [kg], angle in [rad].
+
     Raises:
         TableError: the text has faults; it lists all of them.
         InputError: not a text, or symbols asked of URDF.
 
     Example:
         >>> import screwkin as sk
-        >>> robot_from_text(sk.load_robot("linkages/four-bar").text).name
+        >>> sk.robot_from_text(sk.load_robot("linkages/four-bar").text).name
         'four-bar'
     """
     expect(text, str, "text", "the content of a robot's file, or call load_robot with its path")
