@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -30,26 +31,80 @@ T = TypeVar("T")
 NAME = "screwkin"
 
 
+PLAIN, PREPARED = f"{NAME}, public functions", f"{NAME}, public functions, prepared"
+
+
+def prepared(robot: Robot, *quantities: str) -> Robot:
+    """A copy of the robot, of which some functions are compiled."""
+    copy = replace(robot)
+    sk.prepare(copy, *quantities)
+    return copy
+
+
 def rates(robot: Robot, given: Motion) -> Contestants:
     """W1."""
-    mechanism = sk.closed_mechanism(robot)
-    state = sk.State(given.T_world_base, given.q)
-    joints = [mechanism.secondary.index(name) for name in robot.joint_names]
 
-    def run() -> Result:
-        poses = [sk.frame_pose(robot, state, limb.tip) for limb in robot.limbs]
-        primary = sk.virtual_motion(mechanism, state, given.waist, given.tips)
-        followed = sk.secondary_rates(mechanism, state, primary)
-        return {"poses": np.stack(poses, axis=1), "rates": followed[:, joints]}
+    def public(robot: Robot) -> Contestant:
+        mechanism, state = sk.closed_mechanism(robot), sk.State(given.T_world_base, given.q)
+        if len(given.q) == 1:
+            state = sk.State(given.T_world_base[0], given.q[0])
+        waist, tips = (
+            (given.waist, given.tips)
+            if len(given.q) > 1
+            else (given.waist[0], {tip: x[0] for tip, x in given.tips.items()})
+        )
+        joints = [mechanism.secondary.index(name) for name in robot.joint_names]
 
-    return {f"{NAME}, public functions": Contestant(_warm(run)), **_rate_kernels(robot, given)}
+        def run() -> Any:
+            poses = [sk.frame_pose(robot, state, limb.tip) for limb in robot.limbs]
+            primary = sk.virtual_motion(mechanism, state, waist, tips)
+            return poses, sk.secondary_rates(mechanism, state, primary)
 
+        def result(found: Any) -> Result:
+            poses, secondary = found
+            stacked = np.stack(poses, axis=-3).reshape(len(given.q), -1, 4, 4)
+            return {"poses": stacked, "rates": secondary[..., joints].reshape(len(given.q), -1)}
 
-def _warm(run: Callable[[], T]) -> Callable[[], T]:
-    """Called so often that small batches are computed by programs, too."""
-    for _ in range(2):
         run()
-    return run
+        return Contestant(run, result)
+
+    compiled = prepared(robot, "frame_pose", "virtual_motion", "secondary_rates")
+    plain = {PLAIN: public(robot), PREPARED: public(compiled)}
+    return {**plain, **_bound(robot, given), **_rate_kernels(robot, given)}
+
+
+def _bound(robot: Robot, given: Motion) -> Contestants:
+    """The same by one bound function, with its checks, and without any."""
+    one = len(given.q) == 1
+    own = (lambda x: np.ascontiguousarray(x[0])) if one else np.ascontiguousarray
+    state = sk.State(own(given.T_world_base), own(given.q))
+    arrays = {"base_twist": own(given.waist), "tip_twists": {tip: own(x) for tip, x in given.tips.items()}}
+    both = sk.bind(robot, "tip_poses", "joint_rates")
+    call, filled = both.in_place(state, **arrays)
+
+    def result(found: Any) -> Result:
+        count = len(given.q)
+        return {
+            "poses": found.tip_poses.reshape(count, -1, 4, 4),
+            "rates": found.joint_rates.reshape(count, -1),
+        }
+
+    return {
+        f"{NAME}, bind": Contestant(lambda: both(state, **arrays), result),
+        f"{NAME}, bind, unchecked": Contestant(call, lambda _: result(filled)),
+    }
+
+
+def _twice(
+    robot: Robot, run: Callable[[Robot], Any], result: Callable[[Any], Result], *names: str
+) -> Contestants:
+    """Public functions, of a robot as loaded and of one that was prepared."""
+    contestants = {}
+    for name, body in ((PLAIN, robot), (PREPARED, prepared(robot, *names))):
+        ask = partial(run, body)
+        ask()
+        contestants[name] = Contestant(ask, result)
+    return contestants
 
 
 def _rate_kernels(robot: Robot, given: Motion) -> Contestants:
@@ -113,7 +168,7 @@ def _jax(program: Program, flat: list[Array], function: Any, first: bool) -> Con
 def reach(robot: Robot, given: Reach) -> Contestants:
     """W2."""
 
-    def run() -> sk.ScrewkinError | Any:
+    def run(robot: Robot) -> Any:
         return sk.limb_ik(robot, given.limb.name, given.target, guess=given.guess, least_squares=False)
 
     def result(found: Any) -> Result:
@@ -125,7 +180,7 @@ def reach(robot: Robot, given: Reach) -> Contestants:
     def nearest(found: Any) -> Result:
         return {"q": found["q"], "solved": (found["found"] == 1)[:, 0] & (found["error"] <= 1e-11)[:, 0]}
 
-    contestants = {f"{NAME}, public functions": Contestant(_warm(run), result, "all branches in closed form")}
+    contestants = _twice(robot, run, result, "limb_ik")
     if machine_code(program) is not None:
         note = "the closed form's branch nearest to the guess"
         contestants[f"{NAME}, C kernel"] = Contestant(lambda: kernel(program, told, path="C"), nearest, note)
@@ -140,17 +195,17 @@ def positions(robot: Robot, given: Stance) -> Contestants:
     def result(found: Any) -> Result:
         return {"q": found.state.q, "solved": found.status == 0}
 
-    def run() -> Any:
+    def run(robot: Robot) -> Any:
         return sk.solve_pose(robot, targets, guess)
 
-    return {f"{NAME}, public functions": Contestant(_warm(run), result)}
+    return _twice(robot, run, result, "solve_pose")
 
 
 def balance(robot: Robot, given: Dynamic) -> Contestants:
     """W4."""
     state = sk.State(given.T_world_base, given.q)
 
-    def run() -> Result:
+    def run(robot: Robot) -> Result:
         zmp, com, _, _ = ground_reaction(
             robot, given.T_world_base, given.q, given.qd, given.qdd, given.twist, given.acceleration
         )
@@ -159,7 +214,7 @@ def balance(robot: Robot, given: Dynamic) -> Contestants:
     program = quantities.balance.program(robot)
     told = {"T_world_base": given.T_world_base, "q": given.q, "qd": given.qd, "qdd": given.qdd}
     told |= {"base_twist": given.twist, "base_acceleration": given.acceleration}
-    contestants = {f"{NAME}, public functions": Contestant(_warm(run))}
+    contestants = _twice(robot, run, lambda found: found, "balance", "momentum")
     if machine_code(program) is not None:
         asked = ("com", "momentum", "zmp")
         contestants[f"{NAME}, C kernel"] = Contestant(

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.pytrees import pytree
-from screwkin.compiler.run import run
 from screwkin.dynamics.margin import support_margin
 from screwkin.dynamics.quantities import balance
 from screwkin.dynamics.support import Spike, sole_corners, spikes
 from screwkin.model.robot import Robot
+from screwkin.model.state import State
 from screwkin.trajectory import Trajectory, check_joints
 
 
@@ -70,9 +71,7 @@ def ground_reaction(
         twist: [omega; v of the base origin] (T, 6), world axes.
         acceleration: its time derivative (T, 6).
     """
-    inputs = {"T_world_base": T_world_base, "q": q, "qd": qd, "qdd": qdd}
-    inputs |= {"base_twist": twist, "base_acceleration": acceleration}
-    out = run(balance.program(robot), inputs)
+    out: Any = balance(robot, State(T_world_base, q), qd, qdd, twist, acceleration)
     return out["zmp"], out["com"], out["wrench"], out["cart_table"]
 
 
