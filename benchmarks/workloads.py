@@ -130,7 +130,7 @@ def walked(robot: Robot, count: int) -> sk.Trajectory:
     """A walk of eight steps with at least so many samples."""
     gait = sk.load_gait("walk")
     duration = sk.walk(robot, gait.replace(rate=10.0)).time[-1]
-    return sk.walk(robot, gait.replace(rate=float(np.ceil(count / duration))))
+    return sk.walk(robot, gait.replace(rate=max(10.0, float(np.ceil(count / duration)))))
 
 
 def stance(robot: Robot, trajectory: sk.Trajectory, count: int) -> Stance:

@@ -127,4 +127,4 @@ def test_wrong_input_is_told(robot, places):
         stiffness_maps(robot, places, -1.0)
     assert other_leg(robot, "left_leg") == "right_foot"
     with pytest.raises(InputError, match="no leg but left_leg"):
-        other_leg(replace(robot, limbs=robot.limbs[:1]), "left_leg")
+        other_leg(replace(robot, limbs=robot.limbs[:1], soles=robot.soles[:1]), "left_leg")

@@ -59,7 +59,7 @@ def test_a_wrong_result_is_refused_before_anything_is_timed(robot: Robot) -> Non
 
     def wrong() -> dict[str, np.ndarray]:
         calls.append(1)
-        result = honest[PUBLIC].run()
+        result = honest[PUBLIC].result(honest[PUBLIC].run())
         return {**result, "rates": result["rates"] * (1 + 1e-6)}
 
     liar = {"liar": Contestant(wrong)}

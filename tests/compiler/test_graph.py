@@ -79,6 +79,7 @@ def test_sines_of_sums_of_angles_of_points_are_algebra(numbers):
         y = scalar.where(a > b, x, -scalar.atan2(a, 1.0))
         return [scalar.sin(x), scalar.cos(x), scalar.sin(y), scalar.cos(y)]
 
+    numbers = tuple(x + 0.0 for x in numbers)  # the sign of a zero gives the origin no direction
     found, program = values(make, *numbers)
     assert not program.counts.keys() & {"sin", "cos"}
     a, b, c, d = numbers

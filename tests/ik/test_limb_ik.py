@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from screwkin.dynamics.quantities import frame_pose
+from screwkin.kinematics.body import frame_pose
 from screwkin.errors import InputError, ShapeError, UnknownNameError
 from screwkin.ik.limb import limb_ik
 from screwkin.kinematics.status import Status

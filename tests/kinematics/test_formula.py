@@ -82,9 +82,7 @@ def test_frames_and_the_mechanism_of_bundled_robots(robot: str, path: str) -> No
 
 def test_a_robot_without_joints_has_poses_and_no_columns_of_joints() -> None:
     robot = sk.load_robot("bioloid")
-    alone = robot.__class__(
-        **{**vars(robot), "links": robot.links[:1], "joints": (), "limbs": (), "soles": (), "postures": ()}
-    )
+    alone = replace(robot, links=robot.links[:1], joints=(), limbs=(), soles=(), postures=())
     state = sk.State(np.eye(4), np.zeros(0))
     np.testing.assert_array_equal(sk.link_poses(alone, state), np.eye(4)[None])
     assert sk.jacobian(alone, state, "base").shape == (6, 6)
