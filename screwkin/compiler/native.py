@@ -66,11 +66,16 @@ class Native:
 
         The arrays must outlive it.
         """
-        return self.at(len(outputs[0]), inputs, outputs)
+        return self._call(len(outputs[0]), [*inputs, *outputs])
 
-    def at(self, count: int, inputs: Sequence[Array], outputs: Sequence[Array]) -> Callable[[], object]:
-        """The same for arrays of any shape that hold ``count`` samples one after the other."""
-        arrays = [*inputs, *outputs]
+    def compute(self, count: int, arrays: Sequence[Array]) -> None:
+        """Fill outputs from inputs, all arrays of any shape that hold samples one after the other."""
+        if count < THREADED_FROM:
+            self.function(count, *map(_address, arrays))
+        else:
+            self._call(count, arrays)()
+
+    def _call(self, count: int, arrays: Sequence[Array]) -> Callable[[], object]:
         cores = (self.cores or _cores()) if count >= THREADED_FROM else 1
         if cores == 1:
             return partial(self.function, count, *map(_address, arrays))
@@ -91,9 +96,13 @@ class Native:
 
 def _address(array: Any) -> int:
     """Where an array's numbers lie. The buffer tells in a third of the time that NumPy's attribute takes."""
-    if array.flags.writeable and array.size:
-        return ctypes.addressof(ctypes.c_char.from_buffer(array))
-    return int(array.ctypes.data)
+    try:
+        return _addressof(_from_buffer(array))
+    except (TypeError, ValueError):  # read-only, or empty
+        return int(array.ctypes.data)
+
+
+_addressof, _from_buffer = ctypes.addressof, ctypes.c_char.from_buffer
 
 
 @cache

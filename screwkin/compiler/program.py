@@ -108,7 +108,7 @@ class Program:
         parts = (self.name, self.about, self.inputs, self.outputs, tuple(steps), self.results)
         return digest(repr(parts))
 
-    @property
+    @cached_property
     def operations(self) -> int:
         """Number of operations, sign changes apart (they are absorbed)."""
         return len(self.steps) - self.counts.get("neg", 0)

@@ -73,12 +73,14 @@ def as_rows(array: Array, batch: tuple[int, ...], shape: tuple[int, ...]) -> Arr
     return rows if rows.flags.c_contiguous else np.ascontiguousarray(rows)
 
 
+FEW = 250
+"""Operations of all samples below which even a prepared program runs as Python: calling C takes as long."""
 _PREPARED = "prepared"
 
 
 def chosen_path(program: Program, count: int) -> Way:
-    """The path that ``run`` takes: decided by the number of samples, and by ``prepare`` alone."""
-    if program.memo.get(_PREPARED):
+    """The path that ``run`` takes: a static rule of the samples, and of what was prepared."""
+    if program.memo.get(_PREPARED) and count * program.operations >= FEW:
         return "C"
     return "python" if count <= PYTHON_UP_TO else "numpy"
 

@@ -21,7 +21,7 @@ from screwkin.kinematics.formula import Quantity
 from screwkin.mechanism.choice import closed_mechanism
 from screwkin.mechanism.network import coupling_screws
 from screwkin.mechanism.quantities import network_matrix, virtual_motion
-from screwkin.mechanism.secondary import secondary_program
+from screwkin.mechanism.secondary import secondary_door
 from screwkin.mechanism.tip_motion import joint_rates
 from screwkin.model.robot import Robot
 
@@ -50,7 +50,7 @@ QUANTITIES: Mapping[str, Quantity] = {
 
 
 def _rates(robot: Robot) -> list[Program]:
-    return [secondary_program(robot, *closed_mechanism(robot).choice)]
+    return [secondary_door(robot, *closed_mechanism(robot).choice).guarded]
 
 
 ALGORITHMS: Mapping[str, Callable[[Robot], list[Program]]] = {

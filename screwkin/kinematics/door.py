@@ -57,14 +57,12 @@ class Door:
         Raises:
             ShapeError: a wrong shape, NaN or infinity, a pose that is not rigid, or batches that do not fit.
         """
-        if any(map(is_jax, arrays)):
-            return self._by_jax(arrays)
-        way = chosen_path(self.guarded, 1)
-        found = (
-            self._one_sample(arrays) if way == "python" else self._in_place(arrays) if way == "C" else None
-        )
+        fast = self._one_sample if chosen_path(self.guarded, 1) == "python" else self._in_place
+        found = fast(arrays)
         if found is not None:
             return found
+        if any(map(is_jax, arrays)):
+            return self._by_jax(arrays)
         rows, batch = input_rows(self.arguments, arrays)
         *outputs, guard = run_rows(self.guarded, rows, math.prod(batch))
         if not (guard <= RIGID).all():
@@ -90,14 +88,15 @@ class Door:
     def _in_place(self, arrays: Sequence[Any]) -> list[Array] | None:
         """By machine code that reads the arrays where they are; None if that is not possible."""
         batch = self.batch(arrays)
-        if not batch and batch != ():
+        if batch is None or 0 in batch:
             return None
-        outputs = [np.empty(batch + shape) for shape in self._outputs]
-        guard = np.empty(batch)
         native = machine_code(self.guarded)
         assert native is not None
-        native.at(math.prod(batch), arrays, [*outputs, guard])()
-        return outputs if guard.max() <= RIGID else None  # the slow way says what is wrong
+        outputs = [np.empty(batch + shape) for shape in self._outputs]
+        guard = np.empty(batch)
+        native.compute(math.prod(batch), [*arrays, *outputs, guard])
+        good = guard.max() <= RIGID if batch else guard.item() <= RIGID
+        return outputs if good else None  # the slow way says what is wrong
 
     @cached_property
     def _python(self) -> Callable[..., Sequence[list[float]]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -9,14 +10,15 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.scalar import Scalar, is_jax
 from screwkin.algebra.se3 import ZERO, Pose, Twist, Vector, leaves
-from screwkin.errors import InputError
-from screwkin.kinematics.arrays import Argument, checked_inputs
+from screwkin.errors import InputError, expect
+from screwkin.kinematics.arrays import checked_inputs
 from screwkin.kinematics.formula import formula
 from screwkin.kinematics.kinds import Columns, Joints, TipTwists
 from screwkin.kinematics.status import Status
 from screwkin.mechanism import rates
 from screwkin.mechanism.mechanism import WAIST, Mechanism
 from screwkin.mechanism.network import coupling_twists, network_blocks
+from screwkin.mechanism.secondary import formula_blocks, secondary_arguments
 from screwkin.mechanism.singularity import refuse_singular
 from screwkin.mechanism.virtual_motion import imposing_chains, primary_motion
 from screwkin.model.state import State
@@ -137,12 +139,13 @@ def secondary_rates(
     """
     if on_singular not in ("raise", "status"):
         raise InputError(f"on_singular is {on_singular!r}; valid: raise, status")
-    arguments = [
-        Argument("T_world_base", "state.T_world_base", (4, 4), rigid=True),
-        Argument("q", "state.q", (len(mechanism.robot.joints),)),
-        Argument("primary", "primary_rates", (len(mechanism.primary),)),
-    ]
-    (T, q, primary), _ = checked_inputs(arguments, [state.T_world_base, state.q, primary_rates])
+    expect(mechanism, Mechanism, "mechanism", "closed_mechanism(robot)")
+    expect(state, State, "state", "State(T_world_base, q)")
+    arrays: Sequence[Any] = (state.T_world_base, state.q, primary_rates)
+    if not formula_blocks(mechanism) or not all(type(x) is np.ndarray for x in arrays):
+        arguments = secondary_arguments(mechanism.robot, mechanism.primary)
+        arrays, _ = checked_inputs(arguments, arrays)
+    T, q, primary = arrays
     solution = rates.solve_rates(mechanism, T, q, primary)
     if on_singular == "status":
         return solution.values, _status(solution.singular.any(axis=-1), solution.values.shape[:-1])

@@ -18,12 +18,12 @@ import numpy as np
 from screwkin.algebra.arrays import Array, numpy_of
 from screwkin.algebra.scalar import is_jax
 from screwkin.algebra.se3 import as_array, twist_from_array, unstack
-from screwkin.compiler.run import common_batch, run
+from screwkin.compiler.run import common_batch
 from screwkin.mechanism.choice import RANK_TOLERANCE
 from screwkin.mechanism.mechanism import Mechanism
 from screwkin.mechanism.network import assembled, coupling_screws, twist_rates
 from screwkin.mechanism.scaling import reference_points, referenced
-from screwkin.mechanism.secondary import formula_blocks, secondary_program
+from screwkin.mechanism.secondary import formula_blocks, secondary_door
 from screwkin.model.state import State
 
 CERTIFIED = 2 * RANK_TOLERANCE
@@ -74,37 +74,36 @@ def solve_rates(mechanism: Mechanism, T_world_base: Array, q: Array, primary: Ar
     Returns:
         Singular blocks are solved by least squares, and marked.
     """
-    batch = common_batch((T_world_base, q, primary), (2, 1, 1))
     by_formula = formula_blocks(mechanism)
     if not by_formula or any(map(is_jax, (T_world_base, q, primary))):
-        xp = numpy_of(T_world_base, q, primary)
+        batch, xp = common_batch((T_world_base, q, primary), (2, 1, 1)), numpy_of(T_world_base, q, primary)
         N = network_of(mechanism, T_world_base, q)
         N = xp.broadcast_to(N, (*batch, *N.shape[-2:]))
         return _by_singular_values(mechanism, N, xp.broadcast_to(primary, (*batch, primary.shape[-1])))
+    values, least = secondary_door(mechanism.robot, *mechanism.choice)((T_world_base, q, primary))
+    batch = values.shape[:-1]
+    singular = np.zeros((*batch, len(mechanism.blocks)), dtype=bool)
+    certified = least > CERTIFIED
+    if certified.all() and len(by_formula) == len(mechanism.blocks):
+        return SecondarySolution(values, singular)
     T, q, primary = flat(T_world_base, 2, batch), flat(q, 1, batch), flat(primary, 1, batch)
-    values = np.zeros((len(q), len(mechanism.secondary)))
-    singular = np.zeros((len(q), len(mechanism.blocks)), dtype=bool)
+    rows, marks = values.reshape(len(q), -1), singular.reshape(len(q), -1)
 
     def solve(samples: Array, blocks: Sequence[int]) -> None:
         N = network_of(mechanism, T[samples], q[samples])
         solution = _by_singular_values(mechanism, N, primary[samples], blocks)
         for k in blocks:
             own = mechanism.blocks[k][1]
-            values[samples[:, None], own] = solution.values[:, own]
-            singular[samples, k] = solution.singular[:, k]
+            rows[samples[:, None], own] = solution.values[:, own]
+            marks[samples, k] = solution.singular[:, k]
 
-    others = [k for k in range(len(mechanism.blocks)) if k not in by_formula]
-    program = secondary_program(mechanism.robot, mechanism.primary, mechanism.secondary)
-    result = run(program, {"T_world_base": T, "q": q, "primary": primary})
-    values[:, [i for k in by_formula for i in mechanism.blocks[k][1]]] = result["secondary"]
-    doubtful = np.flatnonzero(~(result["least"] > CERTIFIED).all(axis=-1))
+    doubtful = np.flatnonzero(~certified.all(axis=-1))
     if len(doubtful):
         solve(doubtful, by_formula)
+    others = [k for k in range(len(mechanism.blocks)) if k not in by_formula]
     if others and len(q):
         solve(np.arange(len(q)), others)
-    return SecondarySolution(
-        values.reshape(*batch, values.shape[-1]), singular.reshape(*batch, singular.shape[-1])
-    )
+    return SecondarySolution(values, singular)
 
 
 def secondary_accelerations(

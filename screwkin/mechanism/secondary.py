@@ -13,6 +13,8 @@ from screwkin.algebra.screws import Displacement, at
 from screwkin.algebra.se3 import NO_TWIST, UNTURNED, Rotation, Twist, Vector, cross, dot
 from screwkin.compiler.program import Program, Recorder, kept
 from screwkin.compiler.records import identifier, pose_input
+from screwkin.kinematics.arrays import Argument
+from screwkin.kinematics.door import Door
 from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.limb_rates import Split, pose_rates, split_of
@@ -27,8 +29,13 @@ def formula_blocks(mechanism: Mechanism) -> list[int]:
     return [k for k, (circuits, own) in enumerate(mechanism.blocks) if len(circuits) == 1 and len(own) == 6]
 
 
-@kept
 def secondary_program(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, ...]) -> Program:
+    """The program behind ``secondary_door``."""
+    return secondary_door(robot, primary, secondary).program
+
+
+@kept
+def secondary_door(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, ...]) -> Door:
     """Rates of the secondary couplings of all ``formula_blocks``, and a bound of their singular values.
 
     Args:
@@ -37,8 +44,8 @@ def secondary_program(robot: Robot, primary: tuple[str, ...], secondary: tuple[s
         secondary: names of the secondary couplings.
 
     Returns:
-        Program of ``T_world_base q primary``; ``secondary``: block by block; ``least``: no singular value of
-        a block at its reference point, normalised, is smaller.
+        Calls of ``T_world_base q primary``; ``secondary``: all rates, 0 of couplings in other blocks;
+        ``least``: no singular value of a block at its reference point, normalised, is smaller.
 
     Source: paper A, eq. 10-11.
     """
@@ -52,7 +59,7 @@ def secondary_program(robot: Robot, primary: tuple[str, ...], secondary: tuple[s
     imposed = dict(zip(primary, recorder.input("primary", len(primary)), strict=True))
     twists = _in_base_axes(mechanism, R, q)
     D = link_displacements(robot, q)
-    rates: list[Scalar] = []
+    rates: list[Scalar] = [0.0] * len(secondary)
     least = []
     for k in formula_blocks(mechanism):
         (circuit,), own = mechanism.blocks[k]
@@ -65,11 +72,21 @@ def secondary_program(robot: Robot, primary: tuple[str, ...], secondary: tuple[s
         split, point = _split(mechanism, D, names, twists[names[0]])
         columns = [at(point, twists[name] * signs[name]) for name in names]
         values, determinant = pose_rates(columns, split, at(point, wanted), characteristic_length(robot))
-        rates += values
+        for i, value in zip(own, values, strict=True):
+            rates[i] = value
         least.append(_bound(mechanism, circuit, names, twists, point, D, determinant))
     recorder.output("secondary", rates)
     recorder.output("least", least)
-    return recorder.program()
+    return Door(recorder, secondary_arguments(robot, primary))
+
+
+def secondary_arguments(robot: Robot, primary: Sequence[str]) -> list[Argument]:
+    """State and primary rates, as messages name them."""
+    return [
+        Argument("T_world_base", "state.T_world_base", (4, 4), rigid=True),
+        Argument("q", "state.q", (len(robot.joints),)),
+        Argument("primary", "primary_rates", (len(primary),)),
+    ]
 
 
 def _in_base_axes(mechanism: Mechanism, R: Rotation, q: Sequence[Scalar]) -> dict[str, Twist]:

@@ -6,9 +6,9 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from screwkin.kinematics.body import frame_pose
 from screwkin.errors import InputError, ShapeError, UnknownNameError
 from screwkin.ik.limb import limb_ik
+from screwkin.kinematics.body import frame_pose
 from screwkin.kinematics.status import Status
 from screwkin.model.robot import Robot
 from screwkin.model.state import State, home
