@@ -231,7 +231,10 @@ def gait(robot: Robot, seconds: float, rate: float) -> Contestants:
     def result(walked: Any) -> Result:
         return {"time": walked.time, "margin": walked.margin}
 
-    return {f"{NAME}, walk": Contestant(lambda: sk.walk(robot, chosen, steps), result)}
+    def run(robot: Robot) -> Any:
+        return sk.walk(robot, chosen, steps)
+
+    return _twice(robot, run, result, "walk")
 
 
 def reachable(robot: Robot, limb: str, heights: tuple[float, ...], resolution: float) -> Contestants:
@@ -240,4 +243,7 @@ def reachable(robot: Robot, limb: str, heights: tuple[float, ...], resolution: f
     def result(maps: Any) -> Result:
         return {"area": np.array([found.area for found in maps])}
 
-    return {f"{NAME}, workspace": Contestant(lambda: workspace(robot, limb, heights, resolution), result)}
+    def run(robot: Robot) -> Any:
+        return workspace(robot, limb, heights, resolution)
+
+    return _twice(robot, run, result, "workspace")

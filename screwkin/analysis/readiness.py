@@ -14,12 +14,12 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.errors import InputError, SafetyError, UnknownNameError
+from screwkin.model.records import LIMIT_TOLERANCE
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
 from screwkin.trajectory import Trajectory, check_joints, load_trajectory, sha256_of
 
 VERDICT = "validation.json"
-_ROUNDING = 1e-9  # a posture may lie on a limit, up to rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,7 @@ def limit_faults(robot: Robot, trajectory: Trajectory) -> list[str]:
     steps = np.abs(np.diff(q, axis=0)) / np.diff(time)[:, None]
     faults = []
     for k, joint in enumerate(robot.joints):
-        below, above = joint.lower - _ROUNDING, joint.upper + _ROUNDING
+        below, above = joint.lower - LIMIT_TOLERANCE, joint.upper + LIMIT_TOLERANCE
         outside = (q[:, k] < below) | (q[:, k] > above)
         if outside.any():
             i = int(outside.argmax())
@@ -82,7 +82,7 @@ def limit_faults(robot: Robot, trajectory: Trajectory) -> list[str]:
 
 def _speed_faults(name: str, limit: float, time: Array, rate: Array, steps: Array) -> Iterator[str]:
     for what, values in (("moves", np.abs(rate)), ("steps", steps)):
-        if values.max() > limit * (1.0 + _ROUNDING):
+        if values.max() > limit * (1.0 + LIMIT_TOLERANCE):
             i = int(values.argmax())
             yield f"{name} {what} at {values[i]:.2f} rad/s, its servo at most {limit:.2f}, at {time[i]:.2f} s"
             return

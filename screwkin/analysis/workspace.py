@@ -17,8 +17,10 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import cross, dot, norm
+from screwkin.compiler.program import Program
 from screwkin.errors import InputError
 from screwkin.ik.limb import resting
+from screwkin.ik.limb_map import limb_map
 from screwkin.ik.reach import OUT_OF_REACH, REACHABLE, cause_names, reach
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.model.robot import Robot, refuse_closures
@@ -140,6 +142,11 @@ def default_heights(robot: Robot, limb: str) -> list[float]:
     if drop < 0.02:
         raise InputError(f"{chain.limb} does not hang down in the zero pose; give heights")
     return [round(round((fraction * drop - top) / 0.005) * 0.005, 9) for fraction in LEVELS]
+
+
+def map_program(robot: Robot, chain: SerialChain) -> Program:
+    """The program that a workspace of a limb with a closed form runs."""
+    return limb_map(robot, chain.limb, tuple(resting(robot, chain).tolist()), normalising_length(chain))
 
 
 def normalising_length(chain: SerialChain) -> float:

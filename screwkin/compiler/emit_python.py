@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.compiler.program import Operand, Program, Step
+from screwkin.compiler.program import Operand, Program, kept_with
 
 BLOCK = 4096
 """Samples that ``run_numpy`` computes together: many for what a call costs, few for the cache."""
@@ -92,12 +92,15 @@ _ARRAY: Mapping[str, Callable[..., Any]] = {
 
 def run_numpy(program: Program, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
     """Compute a batch, block by block: flat inputs (B, size) to flat outputs (B, size), which are filled."""
-    last = _last_uses(program)
+    calls = _calls(program)
     for begin in range(0, len(outputs[0]), BLOCK):
         here = slice(begin, begin + BLOCK)
         values: list[Any] = [row for array in inputs for row in np.ascontiguousarray(array[here].T)]
         with np.errstate(all="ignore"):  # branches that are not chosen may divide by zero
-            _run_steps(program.steps, values, last)
+            for function, operands, spent in calls:
+                values.append(function(*[values[x] if isinstance(x, int) else x for x in operands]))
+                for spent_value in spent:
+                    values[spent_value] = None
         results = iter(program.results)
         for array in outputs:
             for k in range(array.shape[1]):
@@ -105,21 +108,17 @@ def run_numpy(program: Program, inputs: Sequence[Array], outputs: Sequence[Array
                 array[here, k] = values[x] if isinstance(x, int) else x
 
 
-def _run_steps(steps: Sequence[Step], values: list[Any], last: Sequence[Sequence[int]]) -> None:
-    for step, spent in zip(steps, last, strict=True):
-        values.append(
-            _ARRAY[step.operation](*(values[x] if isinstance(x, int) else x for x in step.operands))
-        )
-        for x in spent:
-            values[x] = None
+Call = tuple[Callable[..., Any], tuple[Operand, ...], list[int]]
+"""A function, its operands, and the values that nothing needs after it."""
 
 
-def _last_uses(program: Program) -> list[list[int]]:
-    """For every step the values that nothing needs after it: their memory serves again while it is warm."""
+@kept_with
+def _calls(program: Program) -> list[Call]:
+    """Every step as a call; what is spent makes room while its memory is warm."""
     seen = {x for x in program.results if isinstance(x, int)}
-    last: list[list[int]] = []
+    calls: list[Call] = []
     for step in reversed(program.steps):
         spent = [x for x in dict.fromkeys(step.operands) if isinstance(x, int) and x not in seen]
         seen.update(spent)
-        last.append(spent)
-    return last[::-1]
+        calls.append((_ARRAY[step.operation], step.operands, spent))
+    return calls[::-1]

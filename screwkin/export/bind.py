@@ -68,9 +68,9 @@ def prepare(robot: Robot, *quantities: Choice) -> None:
 
     Args:
         robot: n joints.
-        quantities: as for ``bind``, and ``limb_ik``, ``solve_pose``, ``secondary_rates``; default: all of the
-            robot's. Of a frame or limb without a choice: all tips or limbs. Arguments with a default are
-            prepared both ways, all left out and all given.
+        quantities: as for ``bind``, and ``limb_ik solve_pose secondary_rates walk workspace``; default: all
+            that the robot has. Of a frame or limb without a choice: all tips or limbs. Arguments with a
+            default are prepared both ways, all left out and all given.
 
     Example:
         >>> import screwkin as sk

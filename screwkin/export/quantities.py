@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from screwkin.analysis.workspace import map_program
 from screwkin.compiler.program import Program
 from screwkin.dynamics.quantities import balance, ground_wrench, inverse_dynamics, mass_matrix, momentum
 from screwkin.errors import UnknownNameError
+from screwkin.ik.closed import recognised
 from screwkin.ik.programs import limb_programs_of
 from screwkin.kinematics.body import (
     center_of_mass,
@@ -18,11 +20,13 @@ from screwkin.kinematics.body import (
     tip_poses,
 )
 from screwkin.kinematics.formula import Quantity
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.choice import closed_mechanism
+from screwkin.mechanism.least_values import block_values
 from screwkin.mechanism.network import coupling_screws
 from screwkin.mechanism.quantities import network_matrix, virtual_motion
 from screwkin.mechanism.secondary import secondary_door
-from screwkin.mechanism.tip_motion import joint_rates
+from screwkin.mechanism.tip_motion import joint_rates, motion_program, solvable_limbs
 from screwkin.model.robot import Robot
 
 QUANTITIES: Mapping[str, Quantity] = {
@@ -49,6 +53,20 @@ QUANTITIES: Mapping[str, Quantity] = {
 """Every quantity that a formula defines. A new one needs its definition and its row here."""
 
 
+def _walk(robot: Robot) -> list[Program]:
+    """Of a robot whose joints all move in a walk: necks and the like are held, which makes another robot."""
+    mechanism = closed_mechanism(robot)
+    limbs = solvable_limbs(robot, mechanism.secondary)
+    motion = [motion_program(robot, True, limbs)] if limbs else []
+    forces = balance.definition.door(robot, balance.definition.inputs(robot), ()).guarded
+    return [*limb_programs_of(robot), *motion, block_values(robot, *mechanism.choice), forces]
+
+
+def _maps(robot: Robot) -> list[Program]:
+    chains = [SerialChain.of(robot, limb.name) for limb in robot.limbs]
+    return [map_program(robot, chain) for chain in chains if recognised(chain) is not None]
+
+
 def _rates(robot: Robot) -> list[Program]:
     return [secondary_door(robot, *closed_mechanism(robot).choice).guarded]
 
@@ -57,6 +75,8 @@ ALGORITHMS: Mapping[str, Callable[[Robot], list[Program]]] = {
     "limb_ik": limb_programs_of,
     "solve_pose": limb_programs_of,
     "secondary_rates": _rates,
+    "walk": _walk,
+    "workspace": _maps,
 }
 """Functions that are more than a formula, and the programs in them: these can be prepared too."""
 

@@ -16,8 +16,8 @@ from screwkin.compiler.run import run
 from screwkin.ik.closed import ClosedForm, recognised, solve_closed
 from screwkin.ik.programs import limb_branches, limb_pose
 from screwkin.ik.solutions import LimbSolutions, ordered
-from screwkin.kinematics.limits import LIMIT_TOLERANCE
 from screwkin.kinematics.serial_chain import SerialChain, residual
+from screwkin.model.records import LIMIT_TOLERANCE
 
 KINDS = ("q", "valid", "in_limits", "residual")
 

@@ -16,12 +16,13 @@ from screwkin.algebra.se3 import NO_TWIST, ZERO, Pose, Vector
 from screwkin.compiler.program import Program, Recorder
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.ik.closed import EXACT, recognised
-from screwkin.kinematics.limits import CUT, LIMIT_TOLERANCE, TURN, beyond, turn_within
+from screwkin.kinematics.limits import CUT, TURN, beyond, turn_within
 from screwkin.kinematics.rigid import poses
 from screwkin.kinematics.serial_chain import SerialChain, cached, miss
 from screwkin.kinematics.status import SINGULAR
 from screwkin.mechanism.limb_motion import seen_screws
 from screwkin.mechanism.limb_rates import point_rates, pose_rates, split_of
+from screwkin.model.records import LIMIT_TOLERANCE
 from screwkin.model.robot import Robot
 
 CLEAR = 1e-8

@@ -12,9 +12,10 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.pytrees import pytree
 from screwkin.algebra.scalar import is_jax
 from screwkin.errors import InputError
-from screwkin.kinematics.limits import TURN, turns
+from screwkin.kinematics.limits import TURN, beyond, turns
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.kinematics.status import Status
+from screwkin.model.records import LIMIT_TOLERANCE
 
 BEYOND = 1e3
 """Cost, in rad^2 per sample, of a branch with a joint beyond its limits on a path."""
@@ -144,7 +145,7 @@ def _by_turns(angle: Array, lower: float, upper: float, start: float | None) -> 
     span = int((upper - lower) // TURN) + 2
     low = np.ceil((lower - angle.min()) / TURN) - 1
     copies = angle[:, None] + TURN * (low + np.arange(2 * span + 2))
-    toll = np.where((copies < lower - 1e-9) | (copies > upper + 1e-9), ABSENT, 0.0)
+    toll = np.where(beyond(copies, lower, upper) > LIMIT_TOLERANCE, ABSENT, 0.0)
     first = toll[0] + (0.0 if start is None else (copies[0] - start) ** 2)
     cost = (copies[1:, None] - copies[:-1, :, None]) ** 2 + toll[1:, None]
     chosen = _cheapest(first[None], cost[None])[0]

@@ -11,10 +11,9 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.scalar import Scalar, larger, where
+from screwkin.model.records import LIMIT_TOLERANCE
 from screwkin.model.robot import Robot
 
-LIMIT_TOLERANCE = 1e-9
-"""Excess over a joint limit [rad or m] that counts as rounding."""
 CUT = 1e-9
 """Angles closer than this to -pi [rad] are given as pi, so that rounding does not choose the sign."""
 TURN = 2 * math.pi

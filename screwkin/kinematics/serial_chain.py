@@ -112,7 +112,7 @@ class SerialChain:
         return limits.excess(q, self.lower, self.upper)
 
     def within(self, q: Array) -> Array:
-        """(...,) bool: every joint of q (..., n) inside its limits, to ``limits.LIMIT_TOLERANCE``."""
+        """(...,) bool: every joint of q (..., n) inside its limits, to ``LIMIT_TOLERANCE``."""
         return limits.within(q, self.lower, self.upper)
 
     def wrapped(self, q: Array) -> Array:

@@ -27,6 +27,7 @@ from screwkin.algebra.se3 import (
     unstack,
 )
 from screwkin.errors import InputError, NoSolutionError, UnknownNameError
+from screwkin.kinematics import limits
 from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.kinematics.status import CLOSED, SINGULAR, Status
 from screwkin.mechanism.chains import chain_coordinates, chain_pose
@@ -209,5 +210,4 @@ def nearest_closed(robot: Robot, q: Array) -> Array:
 def _beyond_limits(mechanism: Mechanism, x: Array) -> Array:
     joints = mechanism.robot.joints
     q = x[:, [mechanism.position[joint.name] for joint in joints]]
-    lower, upper = np.array([j.lower for j in joints]), np.array([j.upper for j in joints])
-    return np.asarray(((q < lower - 1e-9) | (q > upper + 1e-9)).any(axis=1))
+    return np.asarray(~limits.within(q, *limits.limits_of(mechanism.robot)))

@@ -12,7 +12,7 @@ from screwkin.model.build import all_joints, own_joints, robot_from_rows
 from screwkin.model.checks import row_faults
 from screwkin.model.expression import listed, resolve_parameters
 from screwkin.model.mirror import turns_around
-from screwkin.model.records import Joint, RobotRecord
+from screwkin.model.records import LIMIT_TOLERANCE, Joint, RobotRecord
 from screwkin.model.rows import Rows, parameters_of, read_rows
 from screwkin.model.structure import Mirrored, joint_names, mirrored_limbs, structure_faults
 from screwkin.model.toml import read_toml
@@ -98,7 +98,7 @@ def _posture_faults(rows: Rows, joints: Sequence[Joint], known: Sequence[str]) -
 
 
 def _limit_faults(where: str, joint: Joint, q: Mapping[str, float]) -> Iterator[Fault]:
-    value, margin = float(q.get(joint.name, 0.0)), 1e-9  # a posture may lie on a limit, up to rounding
+    value, margin = float(q.get(joint.name, 0.0)), LIMIT_TOLERANCE
     if not joint.lower - margin <= value <= joint.upper + margin:
         left_out = "" if joint.name in q else ", where joints left out are"
         found = f"{value:.6g}{left_out} lies outside [{joint.lower:.6g}, {joint.upper:.6g}]"

@@ -18,6 +18,8 @@ from screwkin.algebra.se3 import Pose, Vector
 
 JointType = Literal["revolute", "prismatic", "helical"]
 LimbKind = Literal["leg", "arm"]
+LIMIT_TOLERANCE = 1e-9
+"""Excess over a joint limit [rad or m] that counts as rounding: one number for the whole package."""
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from screwkin.kinematics import limits
+from screwkin.model.records import LIMIT_TOLERANCE
 from screwkin.model.table import load_robot
 
 angles = st.floats(-30.0, 30.0)
@@ -60,7 +61,7 @@ def test_a_position_at_its_limit_is_inside_to_the_tolerance(over: float) -> None
     lower, upper = limits.limits_of(robot)
     q = np.zeros((2, len(lower)))
     q[1, 4] = upper[4] + over
-    assert limits.within(q, lower, upper).tolist() == [True, over <= limits.LIMIT_TOLERANCE]
+    assert limits.within(q, lower, upper).tolist() == [True, over <= LIMIT_TOLERANCE]
     if over > 0:
         assert limits.worst_joint(q, lower, upper)[1] == 4
         assert limits.excess(q, lower, upper)[1] == pytest.approx(over, abs=1e-15)
