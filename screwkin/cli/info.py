@@ -57,7 +57,12 @@ def _text(facts: Facts) -> str:
         ("primary", _listed(mechanism.primary)),
         ("secondary", _listed(mechanism.secondary)),
         ("cond(Ns)", f"{facts.condition:.4g}"),
-        ("large batches by", {"C": "compiled C", "numpy": "NumPy (no C compiler found)"}[large_batches()]),
+        (
+            "large batches by",
+            {"C": "NumPy; compiled C where bound or prepared", "numpy": "NumPy (no C compiler found)"}[
+                large_batches()
+            ],
+        ),
     ]
     limbs = [
         (limb.limb, f"{limb.sigma:.4f}", f"NEAR A SINGULARITY: {limb.cause}" if limb.near else "regular")

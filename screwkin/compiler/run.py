@@ -92,7 +92,7 @@ def compile_program(program: Program) -> bool:
 
 
 def large_batches() -> Way:
-    """The path of large batches on this computer: C where a compiler is found, else NumPy."""
+    """The path of bound and prepared functions on this computer: C where a compiler is found, else NumPy."""
     return "C" if native.compiler() else "numpy"
 
 
