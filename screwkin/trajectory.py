@@ -23,9 +23,9 @@ from screwkin.algebra.hermite import hermite, places
 from screwkin.algebra.se3 import as_array, rotation_exp, rotation_from_array, rotation_log
 from screwkin.errors import InputError, TrajectoryError, expect
 from screwkin.files import atomic_write, atomic_write_bytes, csv_text, npz_bytes, read_npz, ros_text
+from screwkin.kinematics.rigid import foreign
 from screwkin.model.display import html_table, listing
 from screwkin.model.robot import Robot
-from screwkin.model.state import not_rigid
 
 TIP_PREFIX = "T_world_"
 _SHAPES: Mapping[str, tuple[str, ...]] = {
@@ -335,7 +335,7 @@ def _inconsistencies(trajectory: Trajectory) -> list[str]:
     return faults + [
         f"{TIP_PREFIX}{name} is not a rigid pose in sample {int(np.argmax(bad))}"
         for name, pose in poses.items()
-        if (bad := not_rigid(pose)).any()
+        if (bad := foreign(pose)).any()
     ]
 
 

@@ -119,12 +119,6 @@ if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_pool.cache_clear)  # a forked child has none of its threads
 
 
-def is_kept(program: Program) -> bool:
-    """True if the compiled program lies in the cache: using it costs no compilation."""
-    cc = compiler()
-    return cc is not None and os.path.exists(_library(program.digest, cc, ()))
-
-
 def compiled(program: Program) -> Native | None:
     """The program as machine code, from the cache or compiled now; None if that is not possible here."""
     function = shared(program.digest, lambda: _source(program), program.name)

@@ -31,10 +31,10 @@ def run(
     """Compute a program for a batch.
 
     Args:
-        program: from ``kernels``.
+        program: from a recorder.
         inputs: every input by name, (..., *shape), float64 NumPy; batches broadcast.
         batch: shape of the batch; default: what the inputs broadcast to.
-        path: how; default: the fastest for so many samples here.
+        path: how; default: see ``chosen_path``.
 
     Returns:
         Every output by name, (*batch, *shape).

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from screwkin.algebra.scalar import Scalar, abs_, sqrt
 from screwkin.algebra.screws import Displacement, at
 from screwkin.algebra.se3 import NO_TWIST, UNTURNED, Rotation, Twist, Vector, cross, dot
-from screwkin.compiler.program import Program, Recorder, kept
+from screwkin.compiler.program import Recorder, kept
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.kinematics.arrays import Argument
 from screwkin.kinematics.door import Door
@@ -27,11 +27,6 @@ from screwkin.model.robot import Robot
 def formula_blocks(mechanism: Mechanism) -> list[int]:
     """Indices of the blocks that have a formula: one circuit, six secondary couplings."""
     return [k for k, (circuits, own) in enumerate(mechanism.blocks) if len(circuits) == 1 and len(own) == 6]
-
-
-def secondary_program(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, ...]) -> Program:
-    """The program behind ``secondary_door``."""
-    return secondary_door(robot, primary, secondary).program
 
 
 @kept

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from screwkin.algebra.pytrees import pytree
 from screwkin.errors import expect
@@ -42,14 +41,6 @@ class State:
             return f"State: T_world_base {np.shape(T)}, q {np.shape(q)}"
         place, joints = (", ".join(f"{x + 0.0:.4g}" for x in values) for values in (T[:3, 3], q))
         return f"State: base at ({place}) m, q = ({joints})"
-
-
-def not_rigid(T: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Which of the matrices (..., 4, 4) are no rigid displacements: skewed, stretched, reflected."""
-    R = T[..., :3, :3]
-    skewed = np.abs(R @ R.swapaxes(-1, -2) - np.eye(3)).max(axis=(-2, -1)) > RIGID
-    foreign = np.abs(T[..., 3, :] - np.array([0.0, 0.0, 0.0, 1.0])).max(axis=-1) > RIGID
-    return np.asarray(skewed | foreign | (np.linalg.det(R) < 0))
 
 
 def home(robot: Robot, posture: str = "home") -> State:

@@ -9,7 +9,7 @@ import screwkin as sk
 from screwkin.compiler.run import run
 from screwkin.errors import SingularError
 from screwkin.mechanism.rates import CERTIFIED, solve_rates
-from screwkin.mechanism.secondary import secondary_program
+from screwkin.mechanism.secondary import secondary_door
 from tests.compiler.robots import with_leg
 from tests.ik.legs import random_parallel_leg, random_spherical_leg
 from tests.kinematics.machines import random_state
@@ -44,7 +44,7 @@ def test_rates_are_those_of_the_network_matrix(name, exchanged):
     size = np.abs(expected).max(axis=1, keepdims=True) / sigma.min(axis=1, keepdims=True)
     assert (np.abs(solution.values - expected) <= 1e-12 * np.maximum(size, 1.0)).all()
     told = {"T_world_base": state.T_world_base, "q": state.q, "primary": primary}
-    least = run(secondary_program(robot, mechanism.primary, mechanism.secondary), told)["least"]
+    least = run(secondary_door(robot, *mechanism.choice).program, told)["least"]
     assert (least <= sigma * (1 + 1e-9)).all()
     assert (least > CERTIFIED).all(axis=1).mean() > 0.95  # the program decides nearly all
 
