@@ -16,7 +16,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.scalar import Scalar, is_jax, where
 from screwkin.compiler.program import Recorder
-from screwkin.compiler.run import chosen_path, compile_program, machine_code, python_function, run_rows
+from screwkin.compiler.run import compile_program, is_prepared, machine_code, python_function, run_rows
 from screwkin.kinematics.arrays import Argument, checked_inputs, input_rows
 from screwkin.kinematics.rigid import deviation
 from screwkin.model.state import RIGID
@@ -51,14 +51,13 @@ class Door:
         compile_program(self.guarded)
         return self
 
-    def __call__(self, arrays: Sequence[Any]) -> list[Array]:
+    def __call__(self, arrays: Sequence[Any]) -> Sequence[Array]:
         """Every output (*batch, *shape), from the inputs in their order.
 
         Raises:
             ShapeError: a wrong shape, NaN or infinity, a pose that is not rigid, or batches that do not fit.
         """
-        fast = self._one_sample if chosen_path(self.guarded, 1) == "python" else self._in_place
-        found = fast(arrays)
+        found = self._by_machine(*arrays) if is_prepared(self.guarded) else self._one_sample(arrays)
         if found is not None:
             return found
         if any(map(is_jax, arrays)):
@@ -85,18 +84,15 @@ class Door:
                 return None
         return batch
 
-    def _in_place(self, arrays: Sequence[Any]) -> list[Array] | None:
-        """By machine code that reads the arrays where they are; None if that is not possible."""
-        batch = self.batch(arrays)
-        if batch is None or 0 in batch:
-            return None
+    @cached_property
+    def _by_machine(self) -> Callable[..., tuple[Array, ...] | None]:
+        """Machine code that reads the arrays where they are; None of what the general way has to look at."""
         native = machine_code(self.guarded)
         assert native is not None
-        outputs = [np.empty(batch + shape) for shape in self._outputs]
-        guard = np.empty(batch)
-        native.compute(math.prod(batch), [*arrays, *outputs, guard])
-        good = guard.max() <= RIGID if batch else guard.item() <= RIGID
-        return outputs if good else None  # the slow way says what is wrong
+        return native.checked(RIGID, self._empty)
+
+    def _empty(self, batch: tuple[int, ...]) -> tuple[Array, ...]:
+        return tuple([np.empty(batch + shape) for shape in self._outputs])
 
     @cached_property
     def _python(self) -> Callable[..., Sequence[list[float]]]:
