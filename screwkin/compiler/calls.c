@@ -1,14 +1,18 @@
 /* Calls of compiled programs from Python, at a fraction of what a foreign function costs: two builtins.
 
-   They use CPython's stable ABI alone, whose declarations stand here, and read arrays by NumPy's array interface;
-   so neither's headers are needed. A builtin's self is a tuple: its plan (bytes), then what it needs of Python. */
+   They use the stable ABIs of CPython and NumPy alone, of which what is needed is declared here, so that no headers
+   are needed; calls.py tries the layout of arrays out before. A builtin's self is a tuple: its plan (bytes), then
+   what it needs of Python. */
 
 #include <pthread.h>
 #include <stddef.h>
 #include <string.h>
 
-typedef struct object object;
 typedef ptrdiff_t ssize;
+typedef struct object {
+    ssize references;
+    struct object *type;
+} object;
 typedef void (*kernel)(size_t samples, double *const *arrays);
 
 extern object _Py_NoneStruct;
@@ -17,13 +21,9 @@ object *PyTuple_GetItem(object *, ssize);
 int PyTuple_SetItem(object *, ssize, object *);
 ssize PyTuple_Size(object *);
 char *PyBytes_AsString(object *);
-object *PyObject_Type(object *);
-object *PyObject_GetAttr(object *, object *);
 object *PyObject_CallFunctionObjArgs(object *, ...);
 object *PyLong_FromSsize_t(ssize);
 double PyFloat_AsDouble(object *);
-void *PyCapsule_GetPointer(object *, const char *);
-void PyErr_Clear(void);
 void Py_IncRef(object *);
 void Py_DecRef(object *);
 void *PyEval_SaveThread(void);
@@ -103,49 +103,42 @@ static int computed(part *all)
     return good;
 }
 
-/* NumPy's array interface. */
+/* NumPy's arrays, and their flags. */
 typedef struct {
-    int two, axes;
-    char kind;
-    int bytes, flags;
+    object head;
+    double *data;
+    int axes;
     ssize *shape, *strides;
-    void *data;
-    object *description;
-} interface;
+    object *base, *dtype;
+    int flags;
+} array;
 
-enum { CONTIGUOUS = 1, ALIGNED = 0x100, NATIVE = 0x200, WRITABLE = 0x400 };
+enum { CONTIGUOUS = 1, ALIGNED = 0x100, WRITABLE = 0x400 };
 
-/* Where the doubles of a C-contiguous array lie, and its batch, in front of its inner axes; NULL if it is none. */
-static double *doubles(object *array, object *name, int flags, const ssize *inner, ssize axes, ssize *batch,
-                       ssize *batch_axes)
+/* What arrays must be, and the batch in front of their inner axes, which the first of them decides. */
+typedef struct {
+    object *type, *dtype;
+    int flags;
+    ssize axes, batch[AXES];
+} kind;
+
+/* Where the doubles of an array lie; NULL if it is not of the kind. */
+static double *doubles(object *given, kind *wanted, const ssize *inner, ssize axes)
 {
-    object *capsule = PyObject_GetAttr(array, name);
-    const interface *x = capsule ? PyCapsule_GetPointer(capsule, NULL) : NULL;
-    double *data = NULL;
-    if (x && x->two == 2 && x->kind == 'f' && x->bytes == 8 && (x->flags & flags) == flags && x->axes >= axes &&
-        x->axes <= AXES) {
-        const ssize before = x->axes - axes;
-        const size_t front = (size_t)before * sizeof(ssize);
-        if (*batch_axes < 0) {
-            *batch_axes = before;
-            memcpy(batch, x->shape, front);
-        }
-        if (before == *batch_axes && !memcmp(batch, x->shape, front) &&
-            !memcmp(inner, x->shape + before, (size_t)axes * sizeof(ssize)))
-            data = x->data;
+    const array *x = (const array *)given;
+    if (given->type != wanted->type || x->dtype != wanted->dtype || (x->flags & wanted->flags) != wanted->flags)
+        return NULL;
+    const ssize before = x->axes - axes;
+    if (before < 0 || x->axes > AXES)
+        return NULL;
+    if (wanted->axes < 0) {
+        wanted->axes = before;
+        memcpy(wanted->batch, x->shape, (size_t)before * sizeof(ssize));
     }
-    if (!x)
-        PyErr_Clear();
-    if (capsule)
-        Py_DecRef(capsule);
-    return data;
-}
-
-static int is_of(object *thing, object *type)
-{
-    object *own = PyObject_Type(thing);
-    Py_DecRef(own);
-    return own == type;
+    if (before != wanted->axes || memcmp(wanted->batch, x->shape, (size_t)before * sizeof(ssize)) ||
+        memcmp(inner, x->shape + before, (size_t)axes * sizeof(ssize)))
+        return NULL;
+    return x->data;
 }
 
 static object *none(void)
@@ -156,37 +149,37 @@ static object *none(void)
 
 /* Outputs of inputs, as a tuple; None of anything that is not plain, or that the guard objects to.
 
-   self: plan, ndarray, float, "__array_struct__", numpy.empty, the outputs' shapes, and a function from a batch
-   to a tuple of arrays for the outputs. */
+   self: plan, ndarray, dtype("float64"), float, numpy.empty, the outputs' shapes, and a function from a batch to a
+   tuple of arrays for the outputs. */
 static object *checked(object *self, object *const *given, ssize count)
 {
     const plan *p = (const plan *)PyBytes_AsString(PyTuple_GetItem(self, 0));
-    object *array = PyTuple_GetItem(self, 1), *number = PyTuple_GetItem(self, 2), *name = PyTuple_GetItem(self, 3);
     const ssize *axes = p->numbers + p->inputs + p->outputs, *shape = axes + p->inputs + p->outputs;
-    ssize batch[AXES], batch_axes = -1;
+    kind wanted = {.axes = -1, .flags = CONTIGUOUS | ALIGNED};
     double scalars[MOST];
     part all = {.of = p, .count = 1};
+    wanted.type = PyTuple_GetItem(self, 1);
+    wanted.dtype = PyTuple_GetItem(self, 2);
     if (count != p->inputs)
         return none();
     for (ssize k = 0; k < count; shape += axes[k++]) {
-        if (is_of(given[k], number) && axes[k] == 0 && batch_axes <= 0) {
-            batch_axes = 0;
+        if (given[k]->type == PyTuple_GetItem(self, 3) && axes[k] == 0 && wanted.axes <= 0) {
+            wanted.axes = 0;
             scalars[k] = PyFloat_AsDouble(given[k]);
             all.arrays[k] = &scalars[k];
-        } else if (is_of(given[k], array)) {
-            const int flags = CONTIGUOUS | ALIGNED | NATIVE;
-            all.arrays[k] = doubles(given[k], name, flags, shape, axes[k], batch, &batch_axes);
+        } else {
+            all.arrays[k] = doubles(given[k], &wanted, shape, axes[k]);
         }
         if (!all.arrays[k])
             return none();
     }
-    for (ssize a = 0; a < batch_axes; ++a)
-        all.count *= batch[a];
-    if (batch_axes < 0 || all.count == 0)
+    for (ssize a = 0; a < wanted.axes; ++a)
+        all.count *= wanted.batch[a];
+    if (wanted.axes < 0 || all.count == 0)
         return none();
 
     object *outputs;
-    if (batch_axes == 0) {
+    if (wanted.axes == 0) {
         object *empty = PyTuple_GetItem(self, 4), *shapes = PyTuple_GetItem(self, 5);
         outputs = PyTuple_New(p->outputs);
         for (ssize k = 0; outputs && k < p->outputs; ++k) {
@@ -197,9 +190,9 @@ static object *checked(object *self, object *const *given, ssize count)
             }
         }
     } else {
-        object *whole = PyTuple_New(batch_axes);
-        for (ssize a = 0; whole && a < batch_axes; ++a)
-            PyTuple_SetItem(whole, a, PyLong_FromSsize_t(batch[a]));
+        object *whole = PyTuple_New(wanted.axes);
+        for (ssize a = 0; whole && a < wanted.axes; ++a)
+            PyTuple_SetItem(whole, a, PyLong_FromSsize_t(wanted.batch[a]));
         outputs = whole ? PyObject_CallFunctionObjArgs(PyTuple_GetItem(self, 6), whole, NULL) : NULL;
         if (whole)
             Py_DecRef(whole);
@@ -207,10 +200,11 @@ static object *checked(object *self, object *const *given, ssize count)
     if (!outputs)
         return NULL;
     int good = PyTuple_Size(outputs) == p->outputs;
-    for (ssize k = 0; good && k < p->outputs; shape += axes[p->inputs + k++]) {
-        const int flags = CONTIGUOUS | ALIGNED | NATIVE | WRITABLE;
+    wanted.flags |= WRITABLE;
+    for (ssize k = 0; good && k < p->outputs; ++k) {
         const ssize at = p->inputs + k;
-        all.arrays[at] = doubles(PyTuple_GetItem(outputs, k), name, flags, shape, axes[at], batch, &batch_axes);
+        all.arrays[at] = doubles(PyTuple_GetItem(outputs, k), &wanted, shape, axes[at]);
+        shape += axes[at];
         good = all.arrays[at] != NULL;
     }
     if (good && computed(&all))

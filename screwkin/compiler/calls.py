@@ -1,7 +1,7 @@
 """Compiled programs as builtins of CPython: a call costs a fraction of what a foreign function's does.
 
-``calls.c`` needs nothing but CPython's stable ABI and a POSIX system. Elsewhere, and without the GIL or a C
-compiler, there are no builtins, and ctypes calls.
+``calls.c`` needs nothing but the stable ABIs of CPython and NumPy and a POSIX system. Elsewhere, and without the
+GIL or a C compiler, there are no builtins, and ctypes calls.
 """
 
 from __future__ import annotations
@@ -43,10 +43,24 @@ def flags() -> tuple[str, ...]:
     return ("-pthread", *(("-undefined", "dynamic_lookup") if sys.platform == "darwin" else ()))
 
 
+@cache
 def possible() -> bool:
-    """True on an interpreter whose builtins these can be."""
+    """True on an interpreter whose builtins these can be, with arrays as ``calls.c`` reads them."""
     free = hasattr(sys, "_is_gil_enabled") and not sys._is_gil_enabled()
-    return sys.implementation.name == "cpython" and not free and sys.platform != "win32"
+    if sys.implementation.name != "cpython" or free or sys.platform == "win32":
+        return False
+    return all(map(_as_declared, (np.zeros((2, 3)), np.zeros((5, 3, 2)).T, np.zeros(()))))
+
+
+def _as_declared(x: Array) -> bool:
+    """True if an array lies in memory as the struct ``array`` of ``calls.c`` says."""
+    form = "nPPiPPPPi"
+    fields = struct.unpack(form, ctypes.string_at(id(x), struct.calcsize(form)))
+    _, kind, data, axes, shape, _, _, dtype, flags = fields
+    known = (id(np.ndarray), x.ctypes.data, x.ndim, id(np.dtype(float)), x.flags.num)
+    if (kind, data, axes, dtype, flags) != known:
+        return False
+    return tuple((ctypes.c_ssize_t * x.ndim).from_address(shape)) == x.shape if x.ndim else True
 
 
 def plan(
@@ -80,7 +94,7 @@ def plan(
 def checked(method: Any, plan: bytes, outputs: Sequence[Group], allocate: Allocate) -> Callable[..., Any]:
     """A function of arrays (*batch, *shape): a tuple of outputs, or None, see ``calls.c``."""
     shapes = tuple(group.shape for group in outputs)
-    return _builtin(method(0), (plan, np.ndarray, float, "__array_struct__", np.empty, shapes, allocate))
+    return _builtin(method(0), (plan, np.ndarray, np.dtype(float), float, np.empty, shapes, allocate))
 
 
 def again(method: Any, plan: bytes, count: int, addresses: Sequence[int]) -> Any:

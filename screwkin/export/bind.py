@@ -133,7 +133,7 @@ class Bound:
         self._door = Door(recorder, list(arguments.values())).prepare()
         self._reads = [(sources[a.name], a.of) for a in self._door.arguments]
         self._needs = {source for source, _ in self._reads} - set(STATE)
-        self._values = _reader(self._reads)
+        self._values, self._compute = _reader(self._reads), self._door.by_machine
         self._results = namedtuple("Results", names) if len(names) > 1 else None
 
     @property
@@ -148,7 +148,14 @@ class Bound:
             ShapeError: a wrong shape, NaN or infinity, a base pose that is not rigid.
             InputError: an array is missing or not an argument of the quantities.
         """
-        found = self._door(self._read(state, arrays))
+        try:
+            values = self._values(state, **arrays)
+        except (TypeError, KeyError, AttributeError):
+            self._refuse(state, arrays)
+            raise
+        found = self._compute(*values)
+        if found is None:
+            found = self._door(values)
         return tuple.__new__(self._results, found) if self._results else found[0]
 
     def in_place(self, state: State, **arrays: Any) -> tuple[Callable[[], object], Any]:
@@ -161,7 +168,11 @@ class Bound:
         Returns:
             The call, without arguments, and the results, which it fills.
         """
-        values = self._read(state, arrays)
+        try:
+            values = self._values(state, **arrays)
+        except (TypeError, KeyError, AttributeError):
+            self._refuse(state, arrays)
+            raise
         door = self._door
         batch = door.batch(values)
         if batch is None:
@@ -181,13 +192,6 @@ class Bound:
                 return None
 
         return call, self._results(*results) if self._results else results[0]
-
-    def _read(self, state: State, arrays: Mapping[str, Any]) -> tuple[Any, ...]:
-        try:
-            return self._values(state, **arrays)
-        except (TypeError, KeyError, AttributeError):
-            self._refuse(state, arrays)
-            raise
 
     def _refuse(self, state: Any, arrays: Mapping[str, Any]) -> None:
         """Say why arguments cannot be read."""
