@@ -1,7 +1,7 @@
 """Compiled programs as builtins of CPython: a call costs a fraction of what a foreign function's does.
 
-``calls.c`` needs nothing but the stable ABIs of CPython and NumPy and a POSIX system. Elsewhere, and without the
-GIL or a C compiler, there are no builtins, and ctypes calls.
+``calls.c`` needs nothing but the stable ABIs of CPython and NumPy and a POSIX system. Elsewhere, and without
+the GIL or a C compiler, there are no builtins, and ctypes calls.
 """
 
 from __future__ import annotations

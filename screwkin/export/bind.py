@@ -153,7 +153,7 @@ class Bound:
         except (TypeError, KeyError, AttributeError):
             self._refuse(state, arrays)
             raise
-        found = self._compute(*values)
+        found: Sequence[Any] | None = self._compute(*values)
         if found is None:
             found = self._door(values)
         return tuple.__new__(self._results, found) if self._results else found[0]
