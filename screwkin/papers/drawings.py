@@ -23,11 +23,11 @@ from screwkin.report.style import (
     SIDES,
     ZMP,
     Figure,
+    finished,
     legend_above,
     new_figure,
-    shade_swings,
     shown,
-    time_axis,
+    time_figure,
 )
 from screwkin.sim.measure import ZmpRecord
 
@@ -82,18 +82,15 @@ def preview(bench: Bench, gait: str, steps: int | None = None, robot: str = "") 
     """Wanted ZMP, that of the cart and of all links, and the CoM, along x and y."""
     account = bench.account(gait, steps, robot)
     wanted, cart, whole = zmp_lines(bench, gait, steps, robot)
-    figure, axes = new_figure(5.2, 2, sharex=True)
+    time = account.trajectory.time
+    figure, axes = time_figure(account, 5.2, 2)
     for k, one in enumerate(axes):
-        shade_swings(one, account)
-        time = account.trajectory.time
         one.plot(time, 1e3 * cart[:, k], color=MEASURED, linewidth=3.0, alpha=0.6, label="ZMP of the cart")
         one.plot(time, 1e3 * wanted[:, k], color="#222222", linewidth=0.9, label="ZMP wanted")
         one.plot(time, 1e3 * whole[:, k], color=ZMP, linewidth=1.0, linestyle="--", label="ZMP of all links")
         one.plot(time, 1e3 * account.balance.com[:, k], color=SIDES[2], label="CoM")
         one.set_ylabel(f"{'xy'[k]} [mm]")
-    time_axis(axes[1], account)
-    legend_above(figure, list(axes), columns=6)
-    return figure
+    return finished(figure, account)
 
 
 def compensated_joints(bench: Bench, gait: str, limb: str, stiffness: float, robot: str = "") -> Figure:
@@ -101,49 +98,39 @@ def compensated_joints(bench: Bench, gait: str, limb: str, stiffness: float, rob
     account = bench.account(gait, None, robot)
     table, time = account.robot, account.trajectory.time
     change = np.degrees(compensated_of(bench, gait, stiffness, "swing", robot).q - account.trajectory.q)
-    figure, (angle, added) = new_figure(5.2, 2, sharex=True)
+    figure, (angle, added) = time_figure(account, 5.2, 2)
     for k, i in enumerate(table.path_to(table.limb(limb).link)):
         style = {"color": SIDES[k % len(SIDES)], "linestyle": LINES[k % 2], "linewidth": 1.2}
         name = shown(table.joint_names[i])
         angle.plot(time, np.degrees(account.trajectory.q[:, i]), label=name, **style)
         added.plot(time, change[:, i], label=name, **style)
-    for one in (angle, added):
-        shade_swings(one, account)
     angle.set_ylabel("intended [deg]")
     added.set_ylabel("added by compensation [deg]")
-    time_axis(added, account)
-    legend_above(figure, [angle], columns=4)
-    return figure
+    return finished(figure, account, columns=4)
 
 
 def commanded_foot(bench: Bench, gait: str, limb: str, stiffness: float, robot: str = "") -> Figure:
     """The foot seen from the waist along x, y and z, as planned and as compensation commands it."""
     account = bench.account(gait, None, robot)
     planned, commanded = _seen_from_waist(bench, gait, limb, stiffness, robot)
-    figure, axes = new_figure(6.0, 3, sharex=True)
+    figure, axes = time_figure(account, 6.0, 3)
     for k, one in enumerate(axes):
-        shade_swings(one, account)
         one.plot(account.trajectory.time, 1e3 * planned[:, k], color=PLAIN, label="intended")
         one.plot(account.trajectory.time, 1e3 * commanded[:, k], "--", color=SIDES[0], label="commanded")
         one.set_ylabel(f"{'xyz'[k]} [mm]")
-    time_axis(axes[-1], account)
-    legend_above(figure, [axes[0]])
-    return figure
+    return finished(figure, account)
 
 
 def compensated_foot(bench: Bench, gait: str, limb: str, stiffness: float, robot: str = "") -> Figure:
     """By how much compensation moves the commanded foot, seen from the waist."""
     account = bench.account(gait, None, robot)
     planned, commanded = _seen_from_waist(bench, gait, limb, stiffness, robot)
-    figure, axes = new_figure(3.0)
-    shade_swings(axes, account)
+    figure, axes = time_figure(account, 3.0)
     for k, colour in enumerate((SIDES[0], SIDES[1], PLAIN)):
         moved = 1e3 * (commanded - planned)[:, k]
         axes.plot(account.trajectory.time, moved, color=colour, label="xyz"[k], linestyle=LINES[k])
     axes.set_ylabel(f"{shown(account.robot.limb(limb).tip)} moved by [mm]")
-    time_axis(axes, account)
-    legend_above(figure, [axes])
-    return figure
+    return finished(figure, account)
 
 
 def _seen_from_waist(bench: Bench, gait: str, limb: str, stiffness: float, robot: str) -> list[Array]:
@@ -165,9 +152,8 @@ def sprung_zmp(
     """ZMP against time of a walk on elastic joints, simulated: wanted, and with every treatment."""
     account = bench.account(gait, None, robot)
     wanted = zmp_lines(bench, gait, None, robot)[0]
-    figure, axes = new_figure(5.6, 2, sharex=True)
+    figure, axes = time_figure(account, 5.6, 2)
     for k, one in enumerate(axes):
-        shade_swings(one, account)
         for treatment, style in zip(treatments, _TREATED, strict=False):
             trial, zmp = _run_of(bench, gait, treatment, stiffness, robot)
             one.plot(zmp.time, 1e3 * zmp.contact[:, k], label=_treated(trial), **style)
@@ -175,9 +161,7 @@ def sprung_zmp(
             account.trajectory.time, 1e3 * wanted[:, k], color="#222222", linewidth=0.9, label="ZMP wanted"
         )
         one.set_ylabel(f"{'xy'[k]} [mm]")
-    time_axis(axes[1], account)
-    legend_above(figure, [axes[0]], columns=4)
-    return figure
+    return finished(figure, account, columns=4)
 
 
 def sprung_zmp_above(
@@ -188,18 +172,16 @@ def sprung_zmp_above(
     trajectory = account.trajectory
     soles = soles_on_floor(account.robot, trajectory.feet, trajectory.T_world_tip)
     wanted = zmp_lines(bench, gait, None, robot)[0]
-    figure, axes = new_figure(
-        0.8 + 1.55 * len(treatments), len(treatments), sharex=True, sharey=True, squeeze=False
-    )
-    for one, treatment, style in zip(axes[:, 0], treatments, _TREATED, strict=False):
+    figure, _ = new_figure(0.8 + 1.55 * len(treatments), len(treatments), sharex=True, sharey=True)
+    for one, treatment, style in zip(figure.axes, treatments, _TREATED, strict=False):
         balance.draw_soles(one, account, soles)
         trial, zmp = _run_of(bench, gait, treatment, stiffness, robot)
         one.plot(*zmp.contact.T, label=_treated(trial), **style)
         one.plot(*wanted.T, color="#222222", linewidth=0.9, label="ZMP wanted")
         one.set_aspect("equal")
         one.set_ylabel("y [m]")
-    axes[-1, 0].set_xlabel("x [m]")
-    legend_above(figure, list(axes[:, 0]), columns=3)
+    figure.axes[-1].set_xlabel("x [m]")
+    legend_above(figure, figure.axes, columns=3)
     return figure
 
 
