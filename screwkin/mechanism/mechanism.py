@@ -7,7 +7,7 @@ joints of no limb. Virtual chains lead from the floor to the waist (floating bas
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -212,7 +212,13 @@ def coupling_graph(robot: Robot, chains: tuple[VirtualChain, ...]) -> CouplingGr
     return CouplingGraph(tuple(v for v in vertices if v in used), tuple(edges))
 
 
+def unchosen(robot: Robot) -> Mechanism:
+    """The mechanism of a robot before any choice: all its couplings are secondary."""
+    chains = virtual_chains(robot)
+    graph = coupling_graph(robot, chains)
+    return Mechanism(robot, chains, graph, (), tuple(name for name, _, _ in graph.edges), 0)
+
+
 def mechanism_of(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, ...]) -> Mechanism:
     """The mechanism of a robot with a choice that has been checked."""
-    chains = virtual_chains(robot)
-    return Mechanism(robot, chains, coupling_graph(robot, chains), primary, secondary, len(primary))
+    return replace(unchosen(robot), primary=primary, secondary=secondary, mobility=len(primary))

@@ -16,7 +16,7 @@ from screwkin.algebra.se3 import ZERO, Twist, Vector, as_array, leaves, map_scal
 from screwkin.errors import InputError
 from screwkin.kinematics.positions import joint_twists, link_displacements, pose_in_base
 from screwkin.mechanism.chains import chain_screws
-from screwkin.mechanism.mechanism import Mechanism, coupling_graph, virtual_chains
+from screwkin.mechanism.mechanism import Mechanism, unchosen
 from screwkin.mechanism.network import network_blocks
 from screwkin.model.robot import Robot
 
@@ -146,11 +146,10 @@ def limb_alone(robot: Robot, limb: str) -> Robot:
 
 def _mechanism(robot: Robot) -> Mechanism:
     """The closed mechanism without a choice of primary couplings, which needs numbers."""
-    chains = virtual_chains(robot)
-    graph = coupling_graph(robot, chains)
-    if len(graph.edges) < len(graph.vertices):
+    mechanism = unchosen(robot)
+    if len(mechanism.couplings) < len(mechanism.links):
         raise InputError(f"{robot.name} has neither limbs nor closures, so no circuits to write down")
-    return Mechanism(robot, chains, graph, (), tuple(name for name, _, _ in graph.edges), 0)
+    return mechanism
 
 
 def coupling_symbols(mechanism: Mechanism) -> dict[str, Symbol]:
