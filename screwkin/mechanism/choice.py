@@ -15,7 +15,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import UNTURNED, norm, rotation_log
-from screwkin.errors import InputError, SingularError, UnknownNameError, expect
+from screwkin.errors import InputError, SingularError, expect, one_of
 from screwkin.kinematics.positions import link_displacements
 from screwkin.mechanism.mechanism import Mechanism, unchosen
 from screwkin.mechanism.network import coupling_twists, network_of_twists
@@ -129,9 +129,7 @@ def _wanted(bare: Mechanism, primary: Sequence[str]) -> set[str]:
         raise InputError(f"primary is the text {primary!r}; give a list of couplings, as [{primary!r}]")
     wanted: set[str] = set()
     for name in primary:
-        if name not in bare.position:
-            raise UnknownNameError("coupling", name, bare.couplings)
-        if name in wanted:
+        if one_of("coupling", name, bare.couplings) in wanted:
             raise InputError(f"primary names {name} twice; give every coupling once")
         wanted.add(name)
     return wanted

@@ -24,7 +24,7 @@ from screwkin.algebra.se3 import (
     rotation_log,
     unstack,
 )
-from screwkin.errors import InputError, NoSolutionError, UnknownNameError
+from screwkin.errors import InputError, NoSolutionError, one_of
 from screwkin.kinematics import limits
 from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.kinematics.status import CLOSED, SINGULAR, Status
@@ -123,9 +123,7 @@ def close_loops(mechanism: Mechanism, guess: State, imposed: Mapping[str, Array]
         (0, 0.9)
     """
     for name in imposed:
-        if name not in mechanism.position:
-            raise UnknownNameError("coupling", name, mechanism.couplings)
-        if name in mechanism.secondary:
+        if one_of("coupling", name, mechanism.couplings) in mechanism.secondary:
             raise InputError(f"{name} is secondary and follows; impose primary couplings only")
     T, q = np.asarray(guess.T_world_base, dtype=float), np.asarray(guess.q, dtype=float)
     values = {name: np.asarray(value, dtype=float) for name, value in imposed.items()}

@@ -24,7 +24,7 @@ from itertools import pairwise
 from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.screws import Screw
 from screwkin.algebra.se3 import IDENTITY, Pose, Vector, cross, dot, map_scalars, norm
-from screwkin.errors import InputError, UnknownNameError
+from screwkin.errors import InputError, one_of
 from screwkin.model.dh import (
     CONVENTIONS,
     QUARTER,
@@ -68,8 +68,7 @@ def dh_from_screws(
         InputError: a helical joint, an axis that is no unit vector, NaN or infinity; it names the joint.
         UnknownNameError: no such convention.
     """
-    if convention not in CONVENTIONS:
-        raise UnknownNameError("convention", str(convention), CONVENTIONS)
+    one_of("convention", convention, CONVENTIONS)
     names = [f"q{i + 1}" for i in range(len(screws))] if names is None else list(names)
     if len(names) != len(screws):
         raise InputError(f"{len(screws)} screws, but {len(names)} names; give each joint its name")

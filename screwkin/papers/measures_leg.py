@@ -11,7 +11,7 @@ from screwkin.analysis.ik_study import IkRow, IkStudy, ik_study
 from screwkin.analysis.stiffness_maps import DeflectionMap, stiffness_maps
 from screwkin.analysis.workspace import WorkspaceMap, workspace
 from screwkin.compliance.stiffness import Method as Law
-from screwkin.errors import InputError, UnknownNameError
+from screwkin.errors import InputError, one_of
 from screwkin.gait.compensation import METHODS, Remaining, compensate, convergence
 from screwkin.gait.footsteps import footholds
 from screwkin.gait.preview import follow_reference, preview_gains
@@ -44,12 +44,8 @@ def ik_ratio(
 
 
 def _row(study: IkStudy, method: str, data: str) -> IkRow:
-    for row in study.rows:
-        if (row.method, row.data) == (method, data):
-            return row
-    raise UnknownNameError(
-        "inverse kinematics method", method, list(dict.fromkeys(r.method for r in study.rows))
-    )
+    rows = {row.method: row for row in study.rows if row.data == data}
+    return one_of("inverse kinematics method", method, rows)
 
 
 def _number(row: IkRow, key: str) -> float:
@@ -73,9 +69,7 @@ def reach(
 ) -> float:
     """Area [m^2] that a limb reaches with its tip level, or the median condition number there."""
     place = map_of(bench, limb, height, resolution, robot)
-    if key not in ("area", "median_condition"):
-        raise UnknownNameError("number of a workspace", key, ("area", "median_condition"))
-    return float(getattr(place, key))
+    return float(getattr(place, one_of("number of a workspace", key, ("area", "median_condition"))))
 
 
 def cut_at(
@@ -118,19 +112,14 @@ def deflection(
     if key == "least_at":
         i, j = np.unravel_index(np.nanargmin(sunk.magnitude), sunk.magnitude.shape)
         return np.array([sunk.place.x[i], sunk.place.y[j]])
-    if key not in ("x", "y", "z"):
-        raise UnknownNameError(
-            "number of a deflection map", key, ("median", "max", "x", "y", "z", "least_at")
-        )
+    one_of("number of a deflection map", key, ("median", "max", "x", "y", "z", "least_at"))
     part = sunk.translation[..., "xyz".index(key)]
     return np.array([np.nanmin(part), np.nanmax(part)])
 
 
 def gains(bench: Bench, key: str, settings: Mapping[str, float]) -> float | Array:
     """Preview gains Ks or Kx (3,) for ``period``, ``com_height``, ``horizon``, and weights Qe, Qx, R."""
-    if key not in ("Ks", "Kx"):
-        raise UnknownNameError("preview gain", key, ("Ks", "Kx"))
-    value: float | Array = getattr(preview_gains(**settings), key)
+    value: float | Array = getattr(preview_gains(**settings), one_of("preview gain", key, ("Ks", "Kx")))
     return value
 
 
@@ -147,10 +136,8 @@ def preview_tracking(
     ``com_height`` [m] of the cart; default: the robot's.
     """
     wanted, cart, whole = zmp_lines(bench, gait, steps, robot, com_height)
-    lines = {"cart": cart, "links": whole}
-    if who not in lines:
-        raise UnknownNameError("ZMP", who, list(lines))
-    return np.asarray(np.abs(lines[who] - wanted).max(axis=0))
+    line = one_of("ZMP", who, {"cart": cart, "links": whole})
+    return np.asarray(np.abs(line - wanted).max(axis=0))
 
 
 def zmp_lines(
@@ -177,9 +164,7 @@ def remaining_of(
 ) -> tuple[Remaining, ...]:
     """The residual after every pass of a compensation, computed once."""
     account = bench.account(gait, None, robot)
-    chosen = next((known for known in METHODS if known == method), None)
-    if chosen is None:
-        raise UnknownNameError("compensation", method, METHODS)
+    chosen = one_of("compensation", method, METHODS)
     key = ("remaining", account.trajectory.sha256, method, model, stiffness, passes)
     return bench.once(
         key,
@@ -192,9 +177,7 @@ def compensated_of(
 ) -> Trajectory:
     """The walk with compensated commands."""
     account = bench.account(gait, None, robot)
-    chosen = next((known for known in METHODS if known == method), None)
-    if chosen is None:
-        raise UnknownNameError("compensation", method, METHODS)
+    chosen = one_of("compensation", method, METHODS)
     key = ("compensated", account.trajectory.sha256, method, stiffness)
     return bench.once(key, lambda: compensate(account.robot, account.trajectory, stiffness, chosen))
 

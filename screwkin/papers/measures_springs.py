@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from screwkin.analysis.compliance import TREATMENTS, Conditions, StudyRow, Trial, compliance_study
-from screwkin.errors import UnknownNameError
+from screwkin.errors import one_of
 from screwkin.papers.bench import Bench
 
 FRICTIONS = (0.8, 1.0)
@@ -17,16 +17,14 @@ def row_of(
 ) -> StudyRow:
     """The runs of a treatment, together with those without any."""
     account = bench.account(gait, None, robot)
-    chosen = next((known for known in TREATMENTS if known == treatment), None)
-    if chosen is None:
-        raise UnknownNameError("treatment", treatment, TREATMENTS)
+    one_of("treatment", treatment, TREATMENTS)
     conditions = Conditions(frictions=tuple(frictions), steps=Conditions().steps[:1])
     key = ("springs", account.trajectory.sha256, stiffness, *frictions)
     rows = bench.once(
         key,
         lambda: compliance_study(account.robot, account.trajectory, stiffness, conditions=conditions),
     )
-    return next(row for row in rows if row.treatment == chosen)
+    return next(row for row in rows if row.treatment == treatment)
 
 
 def trial_of(
@@ -56,8 +54,7 @@ def on_springs(
     ``cut`` is the share by which the median is below that without compensation, ``range`` the least and the
     greatest. Runs that fall have no largest error: if all do, the measure says so.
     """
-    if key not in KEYS:
-        raise UnknownNameError("number of walks on springs", key, KEYS)
+    one_of("number of walks on springs", key, KEYS)
     row = row_of(bench, gait, treatment, stiffness, frictions, robot)
     what, _, axis = key.rpartition(" ")
     k = 0 if axis == "x" else 1

@@ -10,7 +10,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import UNTURNED, Pose, Vector, as_array, vector_from_array
 from screwkin.analysis.chains import by_screws, chains_of
 from screwkin.analysis.compare import random_positions
-from screwkin.errors import InputError, UnknownNameError
+from screwkin.errors import InputError, one_of
 from screwkin.kinematics.positions import screws_in
 from screwkin.model.dh import DHRow
 from screwkin.model.robot import Robot
@@ -76,10 +76,8 @@ def limits(bench: Bench, joint: str, robot: str = "") -> Array:
 
 def sole(bench: Bench, limb: str, robot: str = "") -> Array:
     """Length and width (2,) of a sole [m]."""
-    for one in bench.robot(robot).soles:
-        if one.limb == limb:
-            return np.asarray(np.ptp([_vector(corner)[:2] for corner in one.corners], axis=0))
-    raise UnknownNameError("sole", limb, [one.limb for one in bench.robot(robot).soles])
+    chosen = one_of("sole", limb, {one.limb: one for one in bench.robot(robot).soles})
+    return np.asarray(np.ptp([_vector(corner)[:2] for corner in chosen.corners], axis=0))
 
 
 def size(bench: Bench, along: str = "xyz", link: str = "", robot: str = "") -> Array:
@@ -97,9 +95,7 @@ def reference_error(bench: Bench, limb: str, reference: Sequence[str], robot: st
     A_base,reference times the successive displacements there times A_reference,tip.
     """
     table = bench.robot(robot)
-    chain = next((one for one in chains_of(table) if one.name == limb), None)
-    if chain is None:
-        raise UnknownNameError("limb", limb, [one.name for one in table.limbs])
+    chain = one_of("limb", limb, {one.name: one for one in chains_of(table)})
     there = Pose(UNTURNED, vector_from_array(_middle(table, reference)))
     moved = screws_in(there, chain.screws)
     q = random_positions(table, 1000, np.random.default_rng(0))
@@ -111,8 +107,7 @@ def reference_error(bench: Bench, limb: str, reference: Sequence[str], robot: st
 
 def mechanism(bench: Bench, key: str, robot: str = "") -> float | Sequence[float]:
     """A count of the closed mechanism, or how many names a list of it holds."""
-    if key not in MECHANISM:
-        raise UnknownNameError("fact of a mechanism", key, MECHANISM)
+    one_of("fact of a mechanism", key, MECHANISM)
     value = bench.facts(robot).to_dict()[key]
     listed = key in ("primary", "secondary")
     counted: float | Sequence[float] = len(value) if listed else value
@@ -144,9 +139,7 @@ def dh_lengths(bench: Bench, joint: str, robot: str = "") -> Array:
 
 def _dh_row(robot: Robot, joint: str) -> DHRow:
     rows = {row.joint: row for chain in chains_of(robot) for row in chain.table.rows}
-    if joint not in rows:
-        raise UnknownNameError("joint of a DH table", joint, list(rows))
-    return rows[joint]
+    return one_of("joint of a DH table", joint, rows)
 
 
 def _vector(v: Vector) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.analysis.account import Account
-from screwkin.errors import InputError, UnknownNameError
+from screwkin.errors import InputError, one_of
 from screwkin.papers.bench import Bench
 
 Changes = Mapping[str, str | float] | None
@@ -77,9 +77,7 @@ def balance_number(
     bench: Bench, key: str, gait: str, steps: int | None = None, changes: Changes = None, robot: str = ""
 ) -> float:
     """A number of a walk's balance: see ``BALANCE``; lengths in m."""
-    if key not in BALANCE:
-        raise UnknownNameError("fact of a balance", key, list(BALANCE))
-    value = BALANCE[key](bench.account(gait, steps, robot, changes))
+    value = one_of("fact of a balance", key, BALANCE)(bench.account(gait, steps, robot, changes))
     return value if isinstance(value, int) else float(value)
 
 
@@ -137,9 +135,7 @@ def _rows(account: Account, step: int, at: Sequence[float]) -> list[int]:
 def _path(account: Account, body: str) -> Array:
     """Places (T, 3) of a body in the world."""
     trajectory = account.trajectory
-    T = trajectory.T_world_base if body == "base" else trajectory.T_world_tip.get(body)
-    if T is None:
-        raise UnknownNameError("body", body, ["base", *trajectory.T_world_tip])
+    T = one_of("body", body, {"base": trajectory.T_world_base, **trajectory.T_world_tip})
     return np.asarray(T[:, :3, 3])
 
 
