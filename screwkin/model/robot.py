@@ -65,7 +65,17 @@ class Robot(RobotRecord):
 
     @classmethod
     def from_text(cls, text: str, path: str = "<text>", symbolic: bool = False) -> Self:
-        """The robot of a table's text in TOML, see ``parse_robot``."""
+        """The robot of a table's text in TOML.
+
+        Args:
+            text: TOML; the comments of the bundled tables explain its keys.
+            path: where it comes from, for messages and for ``Robot.path``.
+            symbolic: keep the table's parameters as real sympy symbols of the same names wherever they are
+                used in screws, frames, masses, inertias, boxes and soles; limits and postures stay numbers.
+
+        Raises:
+            TableError: the text has faults; it lists all of them.
+        """
         robot = cls(**vars(read_table(text, path, symbolic)))
         robot.__dict__["text_matches"] = True
         return robot
