@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import io
 import re
 from collections.abc import Callable, Sequence
@@ -19,6 +18,7 @@ from screwkin.papers.claims import Paper, Picture
 from screwkin.papers.drawings import DRAWINGS
 from screwkin.papers.measures import check_call
 from screwkin.papers.reproduce import Measured, Reproduction
+from screwkin.report.page import figure_html
 from screwkin.report.style import DPI, styled
 
 _COLOURS = 256
@@ -142,11 +142,7 @@ def _html(result: Reproduction, pictures: Sequence[Sequence[Drawn]], command: st
             body.append(f"<p>{_text(measured.section.text)}</p>")
         if measured.lines:
             body.append(_table(measured))
-        body += [
-            f'<figure><img alt="{escape(_plain(one.caption))}" src="{_embedded(one.path)}">'
-            f"<figcaption>{_text(one.caption)}</figcaption></figure>"
-            for one in drawn
-        ]
+        body += [figure_html(one.path, escape(_plain(one.caption)), _text(one.caption)) for one in drawn]
     return _PAGE.format(title=escape(paper.title), style=_style(), body="\n".join(body))
 
 
@@ -164,10 +160,6 @@ def _table(measured: Measured) -> str:
 def _text(text: str) -> str:
     """Text for HTML; words between back quotes as code."""
     return re.sub(r"`([^`]*)`", r"<code>\1</code>", escape(text))
-
-
-def _embedded(path: Path) -> str:
-    return f"data:image/png;base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
 
 
 def _style() -> str:
