@@ -22,10 +22,10 @@ R = TypeVar("R")
 @dataclass_transform(frozen_default=True, eq_default=False)
 def record(cls: type[R]) -> type[R]:
     """A frozen dataclass that NumPy leaves alone in operators and that is a JAX pytree."""
-    made = dataclass(frozen=True, eq=False)(cls)
-    made.__array_ufunc__ = None  # type: ignore[attr-defined]
-    remember(made)
-    return made
+    frozen = dataclass(frozen=True, eq=False)(cls)
+    frozen.__array_ufunc__ = None  # type: ignore[attr-defined]
+    remember(frozen)
+    return frozen
 
 
 def leaves(value: Any) -> list[Scalar]:
@@ -264,17 +264,17 @@ def log(pose: Pose) -> Twist:
     return Twist(w, pose.p - once / 2 + cross(w, once) * scalar.vlog(t2))
 
 
-def unstack(array: Any, axis: int = -1) -> list[Scalar]:
-    """The scalars along one axis of an array: floats for a single vector, batches otherwise."""
+def unstack(array: Any) -> list[Scalar]:
+    """The scalars along the last axis of an array: floats for a single vector, batches otherwise."""
     if is_jax(array):
         import jax.numpy as jnp
 
         register_with_jax()
-        return list(jnp.moveaxis(array, axis, 0))
+        return list(jnp.moveaxis(array, -1, 0))
     array = np.asarray(array)
     if array.ndim == 1 and array.dtype != object:
         return list(array.tolist())
-    return list(np.ascontiguousarray(np.moveaxis(array, axis, 0)))
+    return list(np.ascontiguousarray(np.moveaxis(array, -1, 0)))
 
 
 def vector_from_array(array: Any) -> Vector:

@@ -12,11 +12,12 @@ from functools import cached_property
 
 import numpy as np
 
+from screwkin.algebra.arrays import Integers
 from screwkin.algebra.pattern import components
 from screwkin.algebra.se3 import IDENTITY, Pose
 from screwkin.mechanism import graph as graphs
 from screwkin.mechanism.chains import SPATIAL, check_chain, held_pose
-from screwkin.mechanism.graph import CouplingGraph, Integers
+from screwkin.mechanism.graph import CouplingGraph
 from screwkin.model.display import html_table, listing
 from screwkin.model.robot import Limb, Robot
 

@@ -123,7 +123,7 @@ def secondary_accelerations(
     """
     batch = common_batch((T_world_base, q, rates, primary), (2, 1, 1, 1))
     xp = numpy_of(T_world_base, q, rates, primary)
-    S = screws_of(mechanism, T_world_base, q)
+    S = coupling_screws(mechanism, State(T_world_base, q))
     S = xp.broadcast_to(S, (*batch, *S.shape[-2:]))
     rates = xp.broadcast_to(rates, (*batch, rates.shape[-1]))
     scalars = unstack(rates)
@@ -135,14 +135,9 @@ def secondary_accelerations(
     return _by_singular_values(mechanism, assembled(mechanism, S), primary, known=coriolis)
 
 
-def screws_of(mechanism: Mechanism, T_world_base: Array, q: Array) -> Array:
-    """Screws of all couplings (..., 6, couplings), at the base origin, world axes."""
-    return coupling_screws(mechanism, State(T_world_base, q))
-
-
 def network_of(mechanism: Mechanism, T_world_base: Array, q: Array) -> Array:
     """Network matrix (..., 6 circuits, couplings) of checked arrays, formed at the base origin."""
-    N: Array = assembled(mechanism, screws_of(mechanism, T_world_base, q))
+    N: Array = assembled(mechanism, coupling_screws(mechanism, State(T_world_base, q)))
     return N
 
 
