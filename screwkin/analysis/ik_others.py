@@ -1,6 +1,6 @@
 """Inverse kinematics of other libraries on the same limb, where they are installed.
 
-Each function gives None where its library is absent or does not fit the limb.
+Each function returns None where its library is absent or does not fit the limb.
 """
 
 from __future__ import annotations

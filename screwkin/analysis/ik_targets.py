@@ -112,7 +112,7 @@ def random_targets(chain: SerialChain, poses: int, seed: int) -> Array:
 
 
 def walking_targets(chain: SerialChain, path: FootPath) -> Array:
-    """Tip poses (T, 4, 4) in the base frame along a walk, the sole kept as in the zero pose."""
+    """Tip poses (T, 4, 4) in the base frame along a walk, the sole level as in the zero pose."""
     home = as_array(chain.tip).astype(float)
     places = foot_from_waist(path, 1 if home[1, 3] >= 0 else -1)
     target = np.tile(home, (len(places), 1, 1))

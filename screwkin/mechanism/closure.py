@@ -118,8 +118,8 @@ def close_loops(mechanism: Mechanism, guess: State, imposed: Mapping[str, Array]
     Example:
         >>> import screwkin as sk
         >>> mechanism = sk.closed_mechanism(sk.load_robot("linkages/four-bar"))
-        >>> found = sk.close_loops(mechanism, sk.home(mechanism.robot), {"crank": 0.9})
-        >>> int(found.status), round(float(found.state.q[0]), 12)
+        >>> closed = sk.close_loops(mechanism, sk.home(mechanism.robot), {"crank": 0.9})
+        >>> int(closed.status), round(float(closed.state.q[0]), 12)
         (0, 0.9)
     """
     for name in imposed:

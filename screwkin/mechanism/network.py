@@ -92,7 +92,7 @@ def assembled(mechanism: Mechanism, S: Any, circuits: Integers | None = None) ->
 def twist_rates(mechanism: Mechanism, twists: Sequence[Twist], rates: Sequence[Scalar]) -> list[Twist]:
     """Time derivative of every coupling's screw when all couplings move, at the fixed point.
 
-    The link that bears a screw carries it: the derivative is the bracket of that link's twist with it.
+    The link on which a screw stands carries it: the derivative is the bracket of that link's twist with it.
     """
     moving: dict[str, Twist] = {mechanism.links[0]: NO_TWIST}
     derivative: dict[int, Twist] = {}

@@ -97,9 +97,9 @@ def solve_rates(mechanism: Mechanism, T_world_base: Array, q: Array, primary: Ar
             rows[samples[:, None], own] = solution.values[:, own]
             marks[samples, k] = solution.singular[:, k]
 
-    doubtful = np.flatnonzero(~certified.all(axis=-1))
-    if len(doubtful):
-        solve(doubtful, by_formula)
+    uncertified = np.flatnonzero(~certified.all(axis=-1))
+    if len(uncertified):
+        solve(uncertified, by_formula)
     others = [k for k in range(len(mechanism.blocks)) if k not in by_formula]
     if others and len(q):
         solve(np.arange(len(q)), others)

@@ -115,7 +115,7 @@ def symbolic_loops(robot: Robot) -> tuple[SymbolicLimb, ...]:
 
 
 def named_formulas(robot: Robot) -> Robot:
-    """The robot with parameters that are roots or inverse functions of others kept by name."""
+    """The robot with parameters that are roots or inverse functions of others as symbols of their names."""
     import sympy
 
     hard = (sympy.asin, sympy.acos, sympy.atan, sympy.atan2)

@@ -26,7 +26,7 @@ _LINKS = ("parent", "child", "link_a", "link_b")
 
 def swapped(name: str) -> str:
     """The name on the other side: right <-> left; unchanged if it names no side."""
-    return _SIDE.sub(lambda found: _OTHER[found[0]], name)
+    return _SIDE.sub(lambda side: _OTHER[side[0]], name)
 
 
 def is_sided(name: str) -> bool:
@@ -84,7 +84,7 @@ def image(row: Row, part: Collection[str], around: bool = False) -> Row:
 
 
 def _reflected(key: str, value: Any, part: Collection[str]) -> Any:
-    """A value of a row, reflected: a name, a point, turns about the fixed axes, or what is made of these."""
+    """A value of a row, reflected: a name, a point, turns about the fixed axes, or a row or list of these."""
     if isinstance(value, Row):
         return image(value, part)
     if isinstance(value, list):

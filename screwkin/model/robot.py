@@ -53,7 +53,7 @@ __all__ = [
 class Robot(RobotRecord):
     """A robot or mechanism. Links and joints stand in table order; q is in the order of ``joints``.
 
-    Fields are those of ``RobotRecord``. However it is made, it is checked as a table file is.
+    Fields are those of ``RobotRecord``. However it is built, it is checked as a table file is.
 
     Raises:
         TableError: the records have faults; it lists all of them.
