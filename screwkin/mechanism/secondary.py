@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from screwkin.algebra.scalar import Scalar, abs_, sqrt
-from screwkin.algebra.screws import Displacement, at
+from screwkin.algebra.screws import Displacement, at, turn
 from screwkin.algebra.se3 import NO_TWIST, UNTURNED, Rotation, Twist, Vector, cross, dot
 from screwkin.compiler.program import Recorder, kept
 from screwkin.compiler.records import identifier, pose_input
@@ -87,7 +87,7 @@ def _in_base_axes(mechanism: Mechanism, R: Rotation, q: Sequence[Scalar]) -> dic
     real, back = set(mechanism.robot.joint_names), R.T
     level, turned = (coupling_twists(mechanism, axes, q) for axes in (UNTURNED, R))
     return {
-        name: level[k] if name in real else Twist(back @ turned[k].omega, back @ turned[k].v)
+        name: level[k] if name in real else turn(back, turned[k])
         for k, name in enumerate(mechanism.couplings)
     }
 

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any, Self
 
 from screwkin.algebra.scalar import Scalar, is_symbolic
-from screwkin.algebra.se3 import UNTURNED, Pose, Vector
-from screwkin.errors import InputError, UnknownNameError, expect
+from screwkin.algebra.se3 import IDENTITY, Pose
+from screwkin.errors import InputError, expect, one_of
 from screwkin.model.changes import changed_text, check_followed
 from screwkin.model.display import figure, html_table, listing
 from screwkin.model.reading import read_table
@@ -218,22 +218,20 @@ class Robot(RobotRecord):
 
     def link(self, name: str) -> Link:
         """The link of that name; UnknownNameError lists the valid ones."""
-        return _named(self.links, name, "link")
+        return one_of("link", name, {link.name: link for link in self.links})
 
     def joint(self, name: str) -> Joint:
         """The joint of that name; UnknownNameError lists the valid ones."""
-        return _named(self.joints, name, "joint")
+        return one_of("joint", name, {joint.name: joint for joint in self.joints})
 
     def limb(self, name: str) -> Limb:
         """The limb of that name, or the limb whose tip has that name; UnknownNameError lists the limbs."""
-        for limb in self.limbs:
-            if limb.tip == name:
-                return limb
-        return _named(self.limbs, name, "limb")
+        by_tip = {limb.tip: limb for limb in self.limbs}
+        return by_tip.get(name) or one_of("limb", name, {limb.name: limb for limb in self.limbs})
 
     def posture(self, name: str) -> Posture:
         """The posture of that name; UnknownNameError lists the valid ones."""
-        return _named(self.postures, name, "posture")
+        return one_of("posture", name, {posture.name: posture for posture in self.postures})
 
     def frame(self, name: str) -> tuple[str, Pose]:
         """Link and zero pose of a frame: ``base``, a link or a tip.
@@ -247,15 +245,14 @@ class Robot(RobotRecord):
         Raises:
             UnknownNameError: no such frame.
         """
-        if name == "base":
-            return self.base_link, Pose(UNTURNED, Vector(0, 0, 0))
-        for limb in self.limbs:
-            if limb.tip == name:
-                return limb.link, limb.frame
-        for link in self.links:
-            if link.name == name:
-                return link.name, link.frame
-        raise UnknownNameError("frame", name, ("base", *self.tip_names, *self.link_names))
+        return one_of("frame", name, self._frames)
+
+    @cached_property
+    def _frames(self) -> Mapping[str, tuple[str, Pose]]:
+        tips = {limb.tip: (limb.link, limb.frame) for limb in self.limbs}
+        links = {link.name: (link.name, link.frame) for link in self.links}
+        base = {"base": (self.base_link, IDENTITY)}
+        return {**base, **tips, **links, **base}
 
     def with_inertia_floor(self, mass: float = 1e-6, inertia: float = 1e-6) -> Robot:
         """The robot with every link at least so heavy: what simulators need for massless brackets.
@@ -274,13 +271,6 @@ class Robot(RobotRecord):
             return replace(link, mass=max(link.mass, mass), inertia=raised)
 
         return replace(self, links=tuple(raised(link) for link in self.links))
-
-
-def _named(items: tuple[Any, ...], name: str, what: str) -> Any:
-    for item in items:
-        if item.name == name:
-            return item
-    raise UnknownNameError(what, name, [item.name for item in items])
 
 
 def robot_text(robot: Robot) -> str:

@@ -19,6 +19,7 @@ from pydantic_core import ErrorDetails
 
 from screwkin.errors import Fault, FileFaults, InputError
 from screwkin.model.library import find_paper
+from screwkin.model.toml import read_text
 
 Value = float | int | str | Sequence[float] | None
 
@@ -100,11 +101,7 @@ def load_paper(name_or_path: str | Path) -> Paper:
         FileFaults: faults of the file, all at once.
     """
     path = find_paper(name_or_path)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot read {path}: {error}") from None
-    return parse_paper(text, str(path))
+    return parse_paper(read_text(path, FileFaults), str(path))
 
 
 def parse_paper(text: str, path: str = "<text>") -> Paper:
