@@ -24,7 +24,7 @@ class CheckedTable:
 
     Attributes:
         numbers: values of the parameters; None for a faulty one.
-        rows: all rows.
+        rows: all rows, those of mirrored limbs among them.
         mirrored: limbs declared by reflection.
         around: names of the joints whose mirrored position changes sign.
         structural: faults of names and connections.
@@ -51,9 +51,9 @@ def checked_table(data: Mapping[str, Any]) -> CheckedTable:
     structural = [*wrong, *structure_faults(rows, mirrored)]
     faults += [*more, *wrong, *row_faults(rows), *structural[len(wrong) :]]
     around = frozenset(joint.name for _, joint in rows.good("joint") if turns_around(joint))
-    joints = joints_of(with_images(rows, mirrored, around))
-    faults += _posture_faults(rows, joints, joint_names(rows, mirrored))
-    return CheckedTable(numbers, rows, mirrored, around, structural, faults)
+    whole = with_images(rows, mirrored, around)
+    faults += _posture_faults(rows, joints_of(whole), joint_names(rows, mirrored))
+    return CheckedTable(numbers, whole, mirrored, around, structural, faults)
 
 
 def read_table(text: str, path: str, symbolic: bool = False) -> RobotRecord:
@@ -75,8 +75,8 @@ def read_table(text: str, path: str, symbolic: bool = False) -> RobotRecord:
     names, rows = table.numbers, table.rows
     if symbolic:
         names, _ = resolve_parameters(parameters_of(data), symbolic=True)
-        rows, _ = read_rows(data, names, table.numbers)
-    record = robot_from_rows(with_images(rows, table.mirrored, table.around))
+        rows = with_images(read_rows(data, names, table.numbers)[0], table.mirrored, table.around)
+    record = robot_from_rows(rows)
     return replace(record, parameters=dict(names), text=text, path=path)
 
 

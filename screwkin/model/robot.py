@@ -9,7 +9,7 @@ from typing import Any, Self
 
 from screwkin.algebra.scalar import Scalar, is_symbolic
 from screwkin.algebra.se3 import IDENTITY, Pose
-from screwkin.errors import InputError, expect, one_of
+from screwkin.errors import InputError, UnknownNameError, expect, one_of
 from screwkin.model.changes import changed_text, check_followed
 from screwkin.model.display import figure, html_table, listing
 from screwkin.model.reading import read_table
@@ -218,20 +218,22 @@ class Robot(RobotRecord):
 
     def link(self, name: str) -> Link:
         """The link of that name; UnknownNameError lists the valid ones."""
-        return one_of("link", name, {link.name: link for link in self.links})
+        return _named(self.links, name, "link")
 
     def joint(self, name: str) -> Joint:
         """The joint of that name; UnknownNameError lists the valid ones."""
-        return one_of("joint", name, {joint.name: joint for joint in self.joints})
+        return _named(self.joints, name, "joint")
 
     def limb(self, name: str) -> Limb:
         """The limb of that name, or the limb whose tip has that name; UnknownNameError lists the limbs."""
-        by_tip = {limb.tip: limb for limb in self.limbs}
-        return by_tip.get(name) or one_of("limb", name, {limb.name: limb for limb in self.limbs})
+        for limb in self.limbs:
+            if limb.tip == name:
+                return limb
+        return _named(self.limbs, name, "limb")
 
     def posture(self, name: str) -> Posture:
         """The posture of that name; UnknownNameError lists the valid ones."""
-        return one_of("posture", name, {posture.name: posture for posture in self.postures})
+        return _named(self.postures, name, "posture")
 
     def frame(self, name: str) -> tuple[str, Pose]:
         """Link and zero pose of a frame: ``base``, a link or a tip.
@@ -245,7 +247,7 @@ class Robot(RobotRecord):
         Raises:
             UnknownNameError: no such frame.
         """
-        return one_of("frame", name, self._frames)
+        return self._frames.get(name) or one_of("frame", name, self._frames)
 
     @cached_property
     def _frames(self) -> Mapping[str, tuple[str, Pose]]:
@@ -271,6 +273,13 @@ class Robot(RobotRecord):
             return replace(link, mass=max(link.mass, mass), inertia=raised)
 
         return replace(self, links=tuple(raised(link) for link in self.links))
+
+
+def _named(items: tuple[Any, ...], name: str, what: str) -> Any:
+    for item in items:
+        if item.name == name:
+            return item
+    raise UnknownNameError(what, name, [item.name for item in items])
 
 
 def robot_text(robot: Robot) -> str:
