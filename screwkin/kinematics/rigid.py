@@ -25,8 +25,8 @@ def nearest_poses(T: Array) -> tuple[Array, Array]:
 
     The distance is that of ``poses``; rotations are exact to the last digit.
     """
-    found = run(poses(True), {"T": T})
-    return found["deviation"][..., 0], found["pose"]
+    result = run(poses(True), {"T": T})
+    return result["deviation"][..., 0], result["pose"]
 
 
 @cache
