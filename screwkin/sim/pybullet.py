@@ -27,7 +27,7 @@ from screwkin.errors import InputError, MissingDependencyError
 from screwkin.model.robot import Limb, Robot
 from screwkin.model.state import State
 from screwkin.model.urdf import urdf_frames, urdf_from_robot
-from screwkin.sim.backend import Command, Contact, Observation
+from screwkin.sim.backend import Command, Contact, Observation, moment_about_origin
 from screwkin.sim.camera import Camera
 
 UNLIMITED = 1e9
@@ -283,7 +283,7 @@ class PyBulletBackend:
             force = force + motor * foot.axis_in_inertial
         T = self._pose(link[0], link[1])
         f = np.array([0.0, 0.0, foot.mass * self._physics.gravity]) - T[:3, :3] @ force
-        return np.concatenate([_cross(T[:3, 3], f) - T[:3, :3] @ moment, f])
+        return np.concatenate([moment_about_origin(T[:3, 3], f) - T[:3, :3] @ moment, f])
 
     def close(self) -> None:
         """Disconnect; closing twice is harmless."""
@@ -308,12 +308,6 @@ def _check_soles(physics: Physics) -> None:
         raise InputError(f"sole_stiffness is {k!r}; it must be a positive number in N/m, or None")
     if not (np.isfinite(d) and d >= 0):
         raise InputError(f"sole_damping is {d!r}; it must be a finite number of at least 0 in N s/m")
-
-
-def _cross(a: Array, b: Array) -> Array:
-    """Vector product of two triples; ``np.cross`` takes ten times as long for so little."""
-    (u, v, w), (x, y, z) = a.tolist(), b.tolist()
-    return np.array([v * z - w * y, w * x - u * z, u * y - v * x])
 
 
 def _quat_xyzw(R: Array) -> list[float]:
