@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -62,6 +63,10 @@ class Backend(Protocol):
     """A simulated or real robot. Joints stand in table order everywhere."""
 
     name: str
+    servo: str
+    """What its servos are: ``rigid``, ``springs``, …"""
+    settings: Mapping[str, Any]
+    """Of its solver, as JSON data, with ``remarks`` on what it changes of the robot."""
     dt: float
     """Duration of one step [s]."""
 

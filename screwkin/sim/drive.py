@@ -18,10 +18,12 @@ from screwkin.sim.backend import Command
 
 POSITION_GAIN = 0.5
 """Share of a position error that a rigid servo removes in one step."""
+UNLIMITED = 1e9
+"""Stands for an infinite effort [N m] or limit [rad or m], which engines cannot compute with."""
 
 
 @dataclass(frozen=True, eq=False)
-class Drive:
+class Actuation:
     """What is done to every joint in one step, each (n,).
 
     torque on the joint [N m or N]; rate that its motor wants [rad/s or m/s]; bound of the motor's own torque.
@@ -35,6 +37,7 @@ class Drive:
 class Servos(Protocol):
     """The servos of a robot. Joints stand in table order."""
 
+    name: str
     rotor_inertia: Array
     """Inertia (n,) that every rotor adds to its joint, as seen there [kg m^2 or kg]."""
 
@@ -42,23 +45,33 @@ class Servos(Protocol):
         """Servos at rest at positions (n,)."""
         ...
 
-    def drive(self, q: Array, qd: Array, command: Command, dt: float) -> Drive:
-        """What they do for a step of dt [s], from positions and rates (n,) at its start."""
+    def actuate(self, q: Array, qd: Array, motor: Array, command: Command, dt: float) -> Actuation:
+        """What they do in a step.
+
+        Args:
+            q: positions (n,) at its start [rad or m].
+            qd: rates (n,) at its start.
+            motor: (n,) torque that the bounded motors used in the step before.
+            command: to follow.
+            dt: duration of the step [s].
+        """
         ...
 
 
 class RigidServos:
     """Servos that follow their commands exactly, within the efforts of the table."""
 
+    name = "rigid"
+
     def __init__(self, robot: Robot, gain: float = POSITION_GAIN) -> None:
-        self.rotor_inertia = np.zeros(len(robot.joints))
+        self.rotor_inertia = self._no_torque = np.zeros(len(robot.joints))
         self._effort = np.array([joint.effort for joint in robot.joints], dtype=float)
         self._gain = gain
 
     def reset(self, q: Array) -> None:
         """Nothing is remembered."""
 
-    def drive(self, q: Array, qd: Array, command: Command, dt: float) -> Drive:
+    def actuate(self, q: Array, qd: Array, motor: Array, command: Command, dt: float) -> Actuation:
         """The commanded rate, and a share of the position error."""
         rate = np.asarray(command.qd) + self._gain / dt * (np.asarray(command.q) - q)
-        return Drive(np.zeros_like(q), rate, self._effort)
+        return Actuation(self._no_torque, rate, self._effort)

@@ -12,8 +12,8 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -25,10 +25,8 @@ from screwkin.model.robot import Joint, Robot
 from screwkin.model.state import State
 from screwkin.sim.backend import Command, Contact, Observation, moment_about_origin
 from screwkin.sim.bodies import Body, bodies_of
-from screwkin.sim.drive import RigidServos, Servos
+from screwkin.sim.drive import UNLIMITED, RigidServos, Servos
 
-UNLIMITED = 1e9
-"""Stands for an infinite effort [N m] or limit [rad or m], which the solver cannot compute with."""
 STIFFEST = 0.9999
 """Largest impedance of a constraint that MuJoCo takes: the share of it that is not regularised away."""
 CORNER = 1e-4
@@ -84,8 +82,10 @@ class MuJoCoBackend:
         self._physics = physics or MuJoCoPhysics()
         self.dt = self._physics.dt
         self._servos = servos or RigidServos(robot)
+        self.servo = self._servos.name
         self._mj = mj = _imported_mujoco()
-        bodies, self.remarks = bodies_of(robot)
+        bodies, remarks = bodies_of(robot)
+        self.settings: Mapping[str, Any] = {**asdict(self._physics), "remarks": list(remarks)}
         spec = _world(mj, self._physics)
         _add_bodies(mj, spec, robot, bodies, self._servos.rotor_inertia)
         _add_closures(mj, spec, robot, bodies)
@@ -102,7 +102,7 @@ class MuJoCoBackend:
             if limb.kind == "leg"
         ]
         self._steps = 0
-        self._torque = np.zeros(len(joints))
+        self._torque = self._motor = np.zeros(len(joints))
         self._contacts: tuple[Contact, ...] = ()
         self._ankles = np.zeros((len(self._feet), 6))
         self._window = _opened_window(self.model, self.data) if gui else None
@@ -122,7 +122,8 @@ class MuJoCoBackend:
         self._servos.reset(q)
         mj.mj_kinematics(self.model, self.data)
         self._steps, self._began = 0, time.monotonic()
-        self._torque, self._contacts = np.zeros_like(q), ()
+        self._torque = self._motor = np.zeros_like(q)
+        self._contacts = ()
         self._ankles = np.zeros((len(self._feet), 6))
         return self.observe()
 
@@ -130,19 +131,19 @@ class MuJoCoBackend:
         """Let one step pass under a command."""
         mj, model, data = self._mj, self.model, self.data
         q, qd = data.qpos[self._qpos], data.qvel[self._dof]
-        drive = self._servos.drive(q, qd, command, self.dt)
-        model.dof_frictionloss[self._dof] = np.minimum(drive.bound, UNLIMITED)
+        action = self._servos.actuate(q, qd, self._motor, command, self.dt)
+        model.dof_frictionloss[self._dof] = np.minimum(action.bound, UNLIMITED)
         mj.mj_step1(model, data)
-        data.qfrc_applied[self._dof] = drive.torque
-        wanted = np.zeros(model.nv)
-        wanted[self._dof] = (drive.rate - qd) / self.dt
+        data.qfrc_applied[self._dof] = action.torque
+        wanted, motor = np.zeros((2, model.nv))
+        wanted[self._dof] = (action.rate - qd) / self.dt
         rows = slice(data.ne, data.ne + data.nf)
-        moved = data.efc_id[rows]
-        data.efc_aref[rows] = wanted[moved]
+        driven = data.efc_id[rows]
+        data.efc_aref[rows] = wanted[driven]
         mj.mj_step2(model, data)
-        motor = np.zeros(model.nv)
-        motor[moved] = data.efc_force[rows]
-        self._torque = drive.torque + motor[self._dof]
+        motor[driven] = data.efc_force[rows]
+        self._motor = motor[self._dof]
+        self._torque = action.torque + self._motor
         mj.mj_rnePostConstraint(model, data)
         self._contacts = tuple(self._pressing())
         self._ankles = np.array([self._ankle_wrench(body) for body, _ in self._feet]).reshape(-1, 6)
@@ -243,16 +244,12 @@ def _add_bodies(mj: Any, spec: Any, robot: Robot, bodies: tuple[Body, ...], roto
     for body in bodies:
         parent, to_parent = made[body.parent]
         pose = to_parent @ body.frame
-        i = body.inertia
-        element = parent.add_body(
-            name=body.link.name,
-            pos=pose[:3, 3],
-            quat=_quat(mj, pose),
-            explicitinertial=True,
-            mass=float(body.link.mass),
-            ipos=body.point(body.link.com),
-            fullinertia=[i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]],
-        )
+        element = parent.add_body(name=body.link.name, pos=pose[:3, 3], quat=_quat(mj, pose))
+        if body.parent is not None or robot.base == "floating":
+            i = body.inertia
+            element.explicitinertial, element.mass = True, float(body.link.mass)
+            element.ipos = body.point(body.link.com)
+            element.fullinertia = [i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]
         if body.parent is None and robot.base == "floating":
             element.add_freejoint(name="floating base")
         for joint in body.joints:
