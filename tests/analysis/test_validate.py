@@ -200,7 +200,9 @@ def test_a_plan_whose_zmp_leaves_the_soles_fails_even_if_it_stands(
 
 
 def test_unknown_engines_and_foreign_trajectories_are_refused(robot: Robot, walk: Trajectory) -> None:
-    with pytest.raises(UnknownNameError, match=r"unknown engine 'gazebo'; valid: auto, pybullet, mujoco, kinematic"):
+    with pytest.raises(
+        UnknownNameError, match=r"unknown engine 'gazebo'; valid: auto, pybullet, mujoco, kinematic"
+    ):
         validate(robot, walk, engine="gazebo")  # type: ignore[arg-type]
     names = ("head", *walk.joint_names[1:])
     with pytest.raises(InputError, match=r"joints are not those of bioloid: .* the foreign head"):
