@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,6 +11,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, pose_from_array, unstack
 from screwkin.errors import TableError, TrajectoryError
+from screwkin.files import text_sha256
 from screwkin.gait.balance import Balance, zmp
 from screwkin.gait.intended import intended
 from screwkin.kinematics.positions import link_displacements, pose_in_base
@@ -165,7 +165,7 @@ def recorded_robot(trajectory: Trajectory, path: str = "the trajectory") -> Robo
     text = recorded.get("table") if isinstance(recorded, dict) else None
     if not isinstance(recorded, dict) or not isinstance(text, str):
         raise TrajectoryError(f"{path}: meta holds no robot table; make it again with: screwkin walk")
-    if hashlib.sha256(text.encode()).hexdigest() != recorded.get("sha256"):
+    if text_sha256(text) != recorded.get("sha256"):
         raise TrajectoryError(
             f"{path}: the robot table in meta is not the one whose SHA-256 stands beside it; it was changed "
             "after the trajectory was made. Make it again with: screwkin walk"

@@ -17,6 +17,8 @@ from screwkin.trajectory import Trajectory
 
 Engine = Literal["pybullet", "kinematic"]
 ENGINES: tuple[Engine, ...] = ("pybullet", "kinematic")
+PROVING = ("pybullet", "pybullet-compliant", "mujoco")
+"""Names of runs whose contact forces confirm a walk; ``+`` joins the names of two runs."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,11 @@ class SimulatedCompliance:
         k = joint_stiffness(robot, stiffness_of(trajectory) if chosen is None else chosen).tolist()
         by_name = dict(zip(robot.joint_names, k, strict=True))
         return replace(self, servos=replace(self.servos, stiffness=by_name))
+
+
+def confirms(engine: str) -> bool:
+    """Whether runs of that name simulate contact forces, all of them."""
+    return all(name in PROVING for name in engine.split("+"))
 
 
 def opened(robot: Robot, engine: Engine, compliance: SimulatedCompliance, gui: bool) -> Backend:
