@@ -46,14 +46,7 @@ class Account:
     @cached_property
     def closure(self) -> Mapping[str, tuple[float, float]]:
         """For every tip: largest distance [m] and angle [rad] from where the joints carry it."""
-        T = pose_from_array(self.trajectory.T_world_base)
-        D = link_displacements(self.robot, unstack(self.motion.q))
-        errors = {}
-        for tip, recorded in self.trajectory.T_world_tip.items():
-            reached = as_array(T @ pose_in_base(self.robot, D, tip), (self.trajectory.samples,))
-            gap = float(np.linalg.norm(reached[:, :3, 3] - recorded[:, :3, 3], axis=1).max())
-            errors[tip] = (gap, float(_angle(reached[:, :3, :3], recorded[:, :3, :3]).max()))
-        return errors
+        return closure_of(self.robot, self.trajectory, self.motion)
 
     @property
     def max_closure(self) -> float:
@@ -138,7 +131,7 @@ def account_of(robot: Robot, trajectory: Trajectory) -> Account:
         InputError: joints or tips are not the robot's, or a foot has no sole. TrajectoryError: rates or
             accelerations so large that no forces can be computed.
     """
-    _check_tips(robot, trajectory)
+    check_tips(robot, trajectory)
     with np.errstate(over="ignore", invalid="ignore"):
         motion = intended(robot, trajectory)
         balance = zmp(robot, motion)
@@ -176,7 +169,24 @@ def recorded_robot(trajectory: Trajectory, path: str = "the trajectory") -> Robo
         raise TrajectoryError(f"{path}: its robot table is not readable by this version: {error}") from None
 
 
-def _check_tips(robot: Robot, trajectory: Trajectory) -> None:
+def closure_of(robot: Robot, trajectory: Trajectory, motion: Trajectory) -> dict[str, tuple[float, float]]:
+    """For every tip: largest distance [m] and angle [rad] from where the joints of a motion carry it."""
+    T = pose_from_array(trajectory.T_world_base)
+    D = link_displacements(robot, unstack(motion.q))
+    errors = {}
+    for tip, recorded in trajectory.T_world_tip.items():
+        reached = as_array(T @ pose_in_base(robot, D, tip), (trajectory.samples,))
+        gap = float(np.linalg.norm(reached[:, :3, 3] - recorded[:, :3, 3], axis=1).max())
+        errors[tip] = (gap, float(_angle(reached[:, :3, :3], recorded[:, :3, :3]).max()))
+    return errors
+
+
+def check_tips(robot: Robot, trajectory: Trajectory) -> None:
+    """Refuse a trajectory that names no feet, or tips that the robot has not.
+
+    Raises:
+        TrajectoryError: names them.
+    """
     if not trajectory.feet:
         raise TrajectoryError("the trajectory names no feet; a ZMP needs soles on the floor")
     strange = [tip for tip in trajectory.T_world_tip if tip not in robot.tip_names]

@@ -12,17 +12,19 @@ it. Zeroed or scaled rates and accelerations exceed them.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, rotation_from_array, rotation_log
-from screwkin.analysis.account import Account
+from screwkin.analysis.account import check_tips, closure_of
 from screwkin.dynamics.support import sole_corners
-from screwkin.gait.compensation import compensate, stiffness_of
+from screwkin.gait.balance import Balance, zmp
+from screwkin.gait.compensation import compensate, stiffness_of, way_of
+from screwkin.gait.intended import intended
 from screwkin.model.robot import Robot
-from screwkin.trajectory import Trajectory
+from screwkin.trajectory import Trajectory, check_joints
 
 CLOSED = 1e-6
 """How far limbs may end from the recorded tips [m or rad], and points from those computed anew [m]."""
@@ -35,19 +37,23 @@ FAINT = 1e-3
 _ROUNDING = 1e-9  # per unit of rate: of sums of squares of time steps
 
 
-def motion_faults(account: Account) -> tuple[str, ...]:
-    """What in a trajectory contradicts itself, one line for each kind.
+def motion_faults(robot: Robot, trajectory: Trajectory) -> tuple[str, ...]:
+    """What in a trajectory of that robot contradicts itself, one line for each kind.
 
-    Args:
-        account: of the trajectory: what follows from its positions, rates and accelerations.
+    Raises:
+        InputError, NoSolutionError: joints or tips are not the robot's, or poses are out of its reach.
     """
-    return (
-        *_rate_faults(account.motion),
-        *_closure_faults(account),
-        *_standing_faults(account.robot, account.trajectory),
-        *_balance_faults(account),
-        *_command_faults(account),
-    )
+    check_joints(robot, trajectory.joint_names)
+    check_tips(robot, trajectory)
+    with np.errstate(over="ignore", invalid="ignore"):  # what is not finite stays within no bound
+        motion = intended(robot, trajectory)
+        return (
+            *_rate_faults(motion),
+            *_closure_faults(closure_of(robot, trajectory, motion)),
+            *_standing_faults(robot, trajectory),
+            *_balance_faults(trajectory, zmp(robot, motion)),
+            *_command_faults(robot, trajectory, motion),
+        )
 
 
 def _rate_faults(motion: Trajectory) -> Iterator[str]:
@@ -87,8 +93,8 @@ def _disagreements(
             )
 
 
-def _closure_faults(account: Account) -> Iterator[str]:
-    for tip, (gap, angle) in account.closure.items():
+def _closure_faults(closure: Mapping[str, tuple[float, float]]) -> Iterator[str]:
+    for tip, (gap, angle) in closure.items():
         if not max(gap, angle) <= CLOSED:
             yield (
                 f"the joints carry {tip} to {1e3 * gap:.3g} mm and {angle:.3g} rad from its recorded poses"
@@ -113,27 +119,21 @@ def _standing_faults(robot: Robot, trajectory: Trajectory) -> Iterator[str]:
             yield f"{foot} moves while in contact, at {trajectory.time[int(slides.argmax())]:.2f} s"
 
 
-def _balance_faults(account: Account) -> Iterator[str]:
-    recorded, anew = account.trajectory, account.balance
+def _balance_faults(recorded: Trajectory, anew: Balance) -> Iterator[str]:
     for name in ("com", "zmp", "margin"):
         wrong = np.abs(getattr(recorded, name) - getattr(anew, name))
         if not wrong.max() <= CLOSED:
             yield f"the recorded {name} is up to {1e3 * wrong.max():.3g} mm from the one computed anew"
 
 
-def _command_faults(account: Account) -> Iterator[str]:
-    entry = account.trajectory.meta.get("compensation")
-    if entry is None:
+def _command_faults(robot: Robot, trajectory: Trajectory, motion: Trajectory) -> Iterator[str]:
+    """Commands for elastic servos that are not those of their compensation."""
+    if way_of(trajectory) == "none":
         return
-    anew = compensate(
-        account.robot,
-        account.motion,
-        stiffness_of(account.trajectory),
-        entry["method"],
-        entry["passes"],
-        entry["model"],
-    )
-    away = np.abs(anew.q - account.trajectory.q)
+    entry = trajectory.meta["compensation"]
+    choices = (entry[key] for key in ("method", "passes", "model"))
+    anew = compensate(robot, motion, stiffness_of(trajectory), *choices)
+    away = np.abs(anew.q - trajectory.q)
     if not away.max() <= SAME_COMMAND:
         k = int(away.max(axis=0).argmax())
         yield (

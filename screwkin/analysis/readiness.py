@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.analysis.account import account_of
 from screwkin.analysis.consistency import motion_faults
 from screwkin.analysis.frame_deviation import frame_deviation
 from screwkin.analysis.validate import planned_facts
@@ -102,7 +101,8 @@ def _refuse(path: Path, what: str, faults: list[str]) -> None:
 def _verdict_faults(robot: Robot, trajectory: Trajectory, verdict: Verdict) -> list[str]:
     """Fields of a verdict that are not those of robot and trajectory as they stand now."""
     try:
-        anew = planned_facts(robot, trajectory) | bound_to(robot, trajectory)
+        with np.errstate(all="ignore"):  # what is not finite is not the same
+            anew = planned_facts(robot, trajectory) | bound_to(robot, trajectory)
     except ScrewkinError as error:
         return [str(error)]
     faults = [
@@ -130,8 +130,8 @@ def _short(value: Any) -> str:
 
 def _motion_faults(robot: Robot, trajectory: Trajectory) -> list[str]:
     try:
-        return list(motion_faults(account_of(robot, trajectory)))
-    except ScrewkinError as error:
+        return list(motion_faults(robot, trajectory))
+    except (ScrewkinError, KeyError, TypeError) as error:  # meta may hold anything
         return [str(error)]
 
 

@@ -201,9 +201,10 @@ def reasons_of(facts: Measured, rule: Criteria) -> tuple[str, ...]:
     if not facts.min_margin_mm >= 0.0:
         reasons.append(f"planned ZMP leaves the support polygon by {-facts.min_margin_mm:.1f} mm")
     again = facts.repeated
-    if again is not None and again["fallen"] != 0:
+    if again is not None and again.get("fallen") != 0:
         reasons.append(
-            f"falls in {again['fallen']} of {again['runs']} repetitions under other frictions and time steps"
+            f"falls in {again.get('fallen')} of {again.get('runs')} repetitions under other frictions and "
+            "time steps"
         )
     tired = [f"{name} {100 * use:.0f} %" for name, use in facts.torque_use.items() if use > rule.torque_share]
     if tired:

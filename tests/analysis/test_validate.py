@@ -58,7 +58,7 @@ def perfect(robot: Robot, walk: Trajectory) -> Run:
 
 
 def pressing(robot: Robot, run: Run, walk: Trajectory) -> Run:
-    """A run of perfect tracking in the name of an engine with forces: the robot's weight at the planned ZMP."""
+    """A run of perfect tracking as if of an engine with forces: the robot's weight at the planned ZMP."""
     x, y = (np.interp(run.time - run.dt, walk.time, axis) for axis in walk.zmp.T)
     weight, none = np.full_like(x, 9.81 * float(robot.mass)), np.zeros_like(x)
     wrench = np.stack([y * weight, -x * weight, none, none, none, weight], axis=1)
