@@ -32,6 +32,8 @@ STANDS = 1e-4
 """How far the plan may move a sole in contact, in a stance or off the floor [m]."""
 SAME_COMMAND = 1e-4
 """How far commands may lie from those that their compensation gives [rad]: a tick has fifty times as much."""
+EVEN = 1e-3
+"""Share of the time between samples by which one of them may differ."""
 FAINT = 1e-3
 """Share of a column's greatest acceleration below which changes within a step are not looked into."""
 _ROUNDING = 1e-9  # per unit of rate: of sums of squares of time steps
@@ -48,12 +50,22 @@ def motion_faults(robot: Robot, trajectory: Trajectory) -> tuple[str, ...]:
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite stays within no bound
         motion = intended(robot, trajectory)
         return (
+            *_time_faults(trajectory.time),
             *_rate_faults(motion),
             *_closure_faults(closure_of(robot, trajectory, motion)),
             *_standing_faults(robot, trajectory),
             *_balance_faults(trajectory, zmp(robot, motion)),
             *_command_faults(robot, trajectory, motion),
         )
+
+
+def _time_faults(time: Array) -> Iterator[str]:
+    """Samples that are not evenly spaced, as those of plans are: a pause more is another motion."""
+    gap = np.diff(time)
+    uneven = np.abs(gap - np.median(gap))
+    usual, i = np.median(gap), int(uneven.argmax())
+    if not uneven[i] <= EVEN * usual:
+        yield f"samples are {1e3 * gap[i]:.3g} ms apart at {time[i]:.2f} s, elsewhere {1e3 * usual:.3g}"
 
 
 def _rate_faults(motion: Trajectory) -> Iterator[str]:

@@ -80,6 +80,7 @@ TAMPERED: list[tuple[Callable[[Trajectory], dict[str, Any]], str]] = [
     (lambda walk: {"margin": walk.margin + 0.01}, "the recorded margin"),
     (lambda walk: {"zmp": walk.zmp * 0.99}, "the recorded zmp"),
     (lambda walk: {"time": np.where(walk.time < 0.8, walk.time, walk.time + 0.02)}, "rates of "),
+    (lambda walk: {"time": np.where(walk.time > 0, walk.time, -1.0)}, "1.02e+03 ms apart at -1.00 s"),
     (lambda walk: {"time": 0.5 * walk.time}, "rates of "),
 ]
 
