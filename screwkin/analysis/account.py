@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.algebra.se3 import as_array, pose_from_array, unstack
+from screwkin.algebra.se3 import as_array, norm, pose_from_array, rotation_from_array, rotation_log, unstack
 from screwkin.errors import TableError, TrajectoryError
 from screwkin.files import text_sha256
 from screwkin.gait.balance import Balance, zmp
