@@ -32,7 +32,8 @@ def walk(robot: sk.Robot) -> sk.Trajectory:
 def perfect(robot: sk.Robot, walk: sk.Trajectory) -> Validation:
     """A verdict that passes, in the name of an engine with forces."""
     run = simulate(robot, walk, KinematicBackend(robot, dt=0.01))
-    return judged(robot, walk, replace(run, engine="pybullet"), Criteria())
+    check = judged(robot, walk, replace(run, engine="pybullet"), Criteria())
+    return replace(check, passed=True, reasons=(), zmp_rms_mm=0.1, zmp_max_mm=0.2)
 
 
 def named(check: Validation, engine: str, **changes: Any) -> Validation:
