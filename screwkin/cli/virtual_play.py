@@ -22,11 +22,7 @@ def played_to_virtual(trajectory: Path, robot: str, log: Path) -> dict[str, Any]
         data, None where nothing was played; log: the record of the play, if there is one.
     """
     if not load_robot(robot).servos:
-        return {
-            "text": "The robot's table has no [servos]: nothing to play to.",
-            "packets": 0,
-            "servos": None,
-        }
+        return _nothing("The robot's table has no [servos]: nothing to play to.")
     try:
         may = ready(trajectory, robot)
         bus = virtual_bus(may.robot)

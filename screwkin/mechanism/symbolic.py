@@ -13,7 +13,7 @@ from typing import Any
 
 from screwkin.algebra.scalar import Scalar, is_symbolic
 from screwkin.algebra.se3 import ZERO, Twist, Vector, as_array, leaves, map_scalars
-from screwkin.errors import InputError
+from screwkin.errors import InputError, needed_for
 from screwkin.kinematics.positions import joint_twists, link_displacements, pose_in_base
 from screwkin.mechanism.chains import chain_screws
 from screwkin.mechanism.mechanism import Mechanism, coupling_graph, virtual_chains
@@ -115,7 +115,8 @@ def symbolic_loops(robot: Robot) -> tuple[SymbolicLimb, ...]:
 
 def named_formulas(robot: Robot) -> Robot:
     """The robot with parameters that are roots or inverse functions of others kept by name."""
-    import sympy
+    with needed_for("a symbolic model"):
+        import sympy
 
     hard = (sympy.asin, sympy.acos, sympy.atan, sympy.atan2)
     formulas = [
