@@ -9,21 +9,30 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array
+from screwkin.analysis.agreement import agreed, settled
 from screwkin.analysis.compliance import Conditions, StudyRow, Trial, repeated, summarised
-from screwkin.analysis.engines import Engine, SimulatedCompliance, opened
+from screwkin.analysis.engines import Engine, Refinement, SimulatedCompliance, engines_for, opened
 from screwkin.errors import InputError
 from screwkin.gait.balance import zmp as balance_of
 from screwkin.gait.compensation import way_of
 from screwkin.gait.intended import intended
 from screwkin.model.robot import Robot
 from screwkin.sim.camera import Camera, Picture
-from screwkin.sim.compliant import CompliantBackend
 from screwkin.sim.measure import WINDOW, Slip, ZmpRecord, slip, speed_use, torque_use, zmp_record
 from screwkin.sim.render import pictures
 from screwkin.sim.run import Run, Schedule, simulate
 from screwkin.trajectory import Trajectory, check_joints
 
 _SERIES = ("run", "zmp", "pictures")
+_MEASURED = (
+    *("passed", "reasons", "fell", "fell_at", "distance", "end_error_mm", "end_turn_deg", "zmp_rms_mm"),
+    *("zmp_max_mm", "ankle_rms_xy_mm", "slip_mm", "max_tilt_deg", "min_base_height"),
+)
+_FINER = {
+    "usual": Refinement(),
+    "half the step": Refinement(step=2),
+    "twice the iterations": Refinement(iterations=2),
+}
 
 
 @dataclass(frozen=True)
@@ -45,6 +54,9 @@ class Validation:
     hold both, and ankle_rms_xy_mm the ankle sensors against the contacts; None where nothing was measured.
     compensation: how the commands allow for elastic servos, or ``none``; joint_stiffness [N m/rad] and
     sole_stiffness [N/m]: of the simulated springs, None if rigid; repeated: runs under other conditions.
+    engine: names of all engines, joined by ``+``; numbers are the worst of them. By the engine's name:
+    engine_settings, engines: what each measured, and solver: what finer settings change, None if not tried.
+    undecided: the verdict lies within a solver's own scatter; it has not passed.
     """
 
     passed: bool
@@ -75,6 +87,11 @@ class Validation:
     joint_stiffness: dict[str, float] | None
     sole_stiffness: float | None
     repeated: StudyRow | None
+    servo: str
+    engine_settings: dict[str, dict[str, Any]]
+    engines: dict[str, dict[str, Any]]
+    solver: dict[str, dict[str, Any]] | None
+    undecided: bool
     run: Run
     zmp: ZmpRecord
     pictures: tuple[Picture, ...] = ()
@@ -89,7 +106,7 @@ class Validation:
 def validate(
     robot: Robot,
     trajectory: Trajectory,
-    engine: Engine = "pybullet",
+    engine: Engine = "auto",
     *,
     gui: bool = False,
     camera: Camera | None = None,
@@ -97,19 +114,23 @@ def validate(
     compliance: SimulatedCompliance | None = None,
     progress: Callable[[float], None] | None = None,
     motion: Trajectory | None = None,
+    check_solver: bool = False,
 ) -> Validation:
     """Play the trajectory in a simulator and judge what happened.
 
     Args:
         robot: the robot of the trajectory.
         trajectory: what to play.
-        engine: ``pybullet`` (bodies, motors, contacts) or ``kinematic`` (perfect tracking; never passes).
+        engine: ``pybullet`` or ``mujoco`` (bodies, motors, contacts); ``auto``, all of them that are
+            installed, which must agree; or ``kinematic`` (perfect tracking; never passes).
         gui: show a window, in real time.
         camera: take its pictures of what happens; they need neither display nor simulator.
         criteria: what a walk must satisfy.
         compliance: of servos and soles; by default all are rigid. In repeated runs the robot may not fall.
         progress: called now and then with the share done.
         motion: what the joints do instead, as of servos that were measured; judged against the trajectory.
+        check_solver: simulate at half the step and at twice the iterations too; a verdict that this changes,
+            or that lies within what it changes, is undecided and has not passed.
 
     Returns:
         Validation: ``passed``, ``reasons`` and what was measured.
@@ -128,18 +149,37 @@ def validate(
     _check_fit(robot, trajectory)
     rule, report = criteria or Criteria(), progress or (lambda share: None)
     compliance = (compliance or SimulatedCompliance()).for_trajectory(robot, trajectory)
-    first = 0.2 if compliance.repeat else 1.0
-    backend = opened(robot, engine, compliance, gui)
-    try:
-        run = simulate(
-            robot, motion or trajectory, backend, rule.schedule, lambda share: report(first * share)
-        )
-    finally:
-        backend.close()
-    taken = film(robot, trajectory, run, camera) if camera else ()
-    check = replace(judged(robot, trajectory, run, rule, compliance), pictures=taken)
+    names = engines_for(engine, robot, compliance)
+    ways = _FINER if check_solver and names != ("kinematic",) else {"usual": Refinement()}
+    first = (0.2 if compliance.repeat else 1.0) / (len(names) * len(ways))
+    done = 0
+
+    def played(name: Engine, finer: Refinement) -> Validation:
+        nonlocal done
+        backend = opened(robot, name, compliance, gui and not done, finer)
+        try:
+            run = simulate(
+                robot,
+                motion or trajectory,
+                backend,
+                rule.schedule,
+                lambda share: report(first * (done + share)),
+            )
+        finally:
+            backend.close()
+        done += 1
+        return judged(robot, trajectory, run, rule, compliance)
+
+    checks = []
+    for name in names:
+        usual, *others = [played(name, way) for way in ways.values()]
+        finer = dict(zip(list(ways)[1:], others, strict=True))
+        checks.append(settled(usual, finer, lambda check: _reasons(check, rule)) if finer else usual)
+    check = agreed(checks)
+    check = replace(check, pictures=film(robot, trajectory, check.run, camera) if camera else ())
     if not compliance.repeat or compliance.servos is None:
         return check
+    first = 0.2
     conditions = Conditions(sole_stiffness=compliance.sole_stiffness)
 
     def later(share: float) -> None:
@@ -217,11 +257,18 @@ def judged(
         joint_stiffness=dict(springs) if isinstance(springs, Mapping) else None,
         sole_stiffness=compliance.sole_stiffness,
         repeated=None,
+        servo=run.servo,
+        engine_settings={run.engine: dict(run.settings)},
+        engines={},
+        solver=None,
+        undecided=False,
         run=run,
         zmp=zmp,
     )
     reasons = _reasons(facts, criteria)
-    return replace(facts, passed=not reasons, reasons=reasons)
+    check = replace(facts, passed=not reasons, reasons=reasons)
+    measured = check.to_dict()
+    return replace(check, engines={run.engine: {name: measured[name] for name in _MEASURED}})
 
 
 def _least_margin(robot: Robot, trajectory: Trajectory) -> float:
@@ -234,7 +281,7 @@ def _reasons(facts: Validation, rule: Criteria) -> tuple[str, ...]:
     """Every criterion that failed, with its number and its bound."""
     reasons = []
     if facts.engine == "kinematic":
-        reasons.append("engine kinematic simulates no forces and confirms nothing; use pybullet")
+        reasons.append("engine kinematic simulates no forces and confirms nothing; use mujoco")
     if facts.fell_at is not None:
         reasons.append(
             f"fell at {facts.fell_at:.2f} s: tilt {facts.max_tilt_deg:.0f} deg (limit "
@@ -256,7 +303,7 @@ def _reasons(facts: Validation, rule: Criteria) -> tuple[str, ...]:
 def _warnings(robot: Robot, trajectory: Trajectory, run: Run, slipped: Slip, speed: Array) -> tuple[str, ...]:
     """What does not fail a walk but should be known."""
     warnings = []
-    if way_of(trajectory) != "none" and run.engine != CompliantBackend.name:
+    if way_of(trajectory) != "none" and run.servo == "rigid":
         warnings.append("commands that allow for elastic servos, simulated on rigid ones")
     fast = [
         f"{joint.name} {use * joint.velocity:.1f} of {joint.velocity:.1f} rad/s"

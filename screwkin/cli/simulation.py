@@ -29,11 +29,13 @@ FEWEST, MOST = 30, 120
 class Wish:
     """What a simulation is to be: engine, a window, a film, pictures and page; commands for the page.
 
-    compliance: see ``validate``. motion: what the joints do instead of the trajectory; criteria: what
-    a walk must satisfy; more: what follows once the verdict is written; it returns what draws more pictures.
+    check_solver, compliance: see ``validate``. motion: what the joints do instead of the trajectory;
+    criteria: what a walk must satisfy; more: what follows once the verdict is written; it returns what draws
+    more pictures.
     """
 
-    engine: str = "pybullet"
+    engine: str = "auto"
+    check_solver: bool = False
     gui: bool = False
     video: bool = False
     plots: bool = True
@@ -70,6 +72,7 @@ def simulate_to_files(account: Account, folder: Path, verdict: Path, wish: Wish)
             compliance=wish.compliance,
             progress=done,
             motion=wish.motion,
+            check_solver=wish.check_solver,
         )
     with atomic_write(verdict) as file:
         file.write(json.dumps(plain(check.to_dict()), indent=2, allow_nan=False) + "\n")
@@ -85,8 +88,8 @@ def simulate_to_files(account: Account, folder: Path, verdict: Path, wish: Wish)
 
 
 def print_verdict(check: Validation) -> None:
-    """Passed, or not with every reason; warnings on stderr."""
-    print("passed" if check.passed else "NOT passed:")
+    """Passed, or not or undecided with every reason; warnings on stderr."""
+    print("passed" if check.passed else "UNDECIDED:" if check.undecided else "NOT passed:")
     for reason in check.reasons:
         print(f"  {reason}")
     for warning in check.warnings:

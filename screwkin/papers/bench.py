@@ -70,7 +70,7 @@ class Bench:
         """The verdict of the simulator on a walk, with rigid soles or elastic ones [N/m]."""
         trajectory, compliance = account.trajectory, SimulatedCompliance(sole_stiffness=sole_stiffness)
         key = ("validation", trajectory.sha256, sole_stiffness)
-        return self.once(key, lambda: validate(account.robot, trajectory, compliance=compliance))
+        return self.once(key, lambda: validate(account.robot, trajectory, "pybullet", compliance=compliance))
 
     def comparison(self, robot: str = "") -> Comparison:
         """Screws against DH tables."""

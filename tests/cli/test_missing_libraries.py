@@ -57,7 +57,7 @@ VERBS = {
     "ik": "ik bioloid right_arm --poses 5",
     "walk": "walk bioloid --gait step-in-place --set Tc=0.6 --steps 1 --rate 50 -o walk",
     "zmp": "zmp walk/trajectory.npz",
-    "validate": "validate walk/trajectory.npz --engine pybullet --no-plots",
+    "validate": "validate walk/trajectory.npz --engine mujoco --no-plots",
     "send": "send walk/trajectory.npz",
     "send --virtual": "send walk/trajectory.npz --virtual --go -o send",
     "validate kinematic": "validate walk/trajectory.npz --engine kinematic -o kinematic",
@@ -73,10 +73,10 @@ AS_EVER = {"validate kinematic": 3, "bus scan": 2}
 """Exit codes that are not 0 with every library: no forces were simulated, and there is no such port."""
 NEEDS = {
     "table --symbolic": ["sympy"],
-    "validate": ["pybullet"],
+    "validate": ["mujoco"],
     "bus scan": ["serial"],
     "send --virtual": ["dynamixel_sdk", "serial"],  # the driver imports it
-    "demo": ["pybullet"],
+    "demo": ["mujoco"],
 }
 VERDICT = {"send", "send --virtual"}
 """What is refused, with exit code 4, where there is no verdict."""
