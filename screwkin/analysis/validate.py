@@ -21,6 +21,7 @@ from screwkin.sim.camera import Camera, Picture
 from screwkin.sim.measure import WINDOW, Slip, ZmpRecord, slip, speed_use, torque_use, zmp_record
 from screwkin.sim.render import pictures
 from screwkin.sim.run import Run, Schedule, simulate
+from screwkin.sim.self_collision import SelfCollision, collisions_of_run
 from screwkin.trajectory import Trajectory, check_joints
 
 _SERIES = ("run", "zmp", "pictures")
@@ -56,7 +57,8 @@ class Validation:
     sole_stiffness [N/m]: of the simulated springs, None if rigid; repeated: runs under other conditions.
     engine: names of all engines, joined by ``+``; numbers are the worst of them. By the engine's name:
     engine_settings, engines: what each measured, and solver: what finer settings change, None if not tried.
-    undecided: the verdict lies within a solver's own scatter; it has not passed.
+    undecided: the verdict lies within a solver's own scatter; it has not passed. self_collisions: along plan
+    and simulation, beyond what ``home`` has; None where none were looked for.
     """
 
     passed: bool
@@ -92,6 +94,7 @@ class Validation:
     engines: dict[str, dict[str, Any]]
     solver: dict[str, dict[str, Any]] | None
     undecided: bool
+    self_collisions: tuple[SelfCollision, ...] | None
     run: Run
     zmp: ZmpRecord
     pictures: tuple[Picture, ...] = ()
@@ -100,7 +103,11 @@ class Validation:
         """All but the series, as JSON data for ``validation.json``."""
         values = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in _SERIES}
         plain = {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
-        return plain | {"repeated": None if self.repeated is None else self.repeated.to_dict()}
+        collisions = self.self_collisions
+        return plain | {
+            "repeated": None if self.repeated is None else self.repeated.to_dict(),
+            "self_collisions": None if collisions is None else [one.to_dict() for one in collisions],
+        }
 
 
 def validate(
@@ -262,6 +269,7 @@ def judged(
         engines={},
         solver=None,
         undecided=False,
+        self_collisions=None if run.engine == "kinematic" else collisions_of_run(robot, trajectory, run),
         run=run,
         zmp=zmp,
     )
@@ -297,6 +305,8 @@ def _reasons(facts: Validation, rule: Criteria) -> tuple[str, ...]:
     tired = [f"{name} {100 * use:.0f} %" for name, use in facts.torque_use.items() if use > rule.torque_share]
     if tired:
         reasons.append(f"torque at the servo's limit for {1e3 * WINDOW:.0f} ms: {', '.join(tired)}")
+    if facts.self_collisions:
+        reasons.append(f"links collide: {', '.join(map(str, facts.self_collisions))}")
     return tuple(reasons)
 
 

@@ -360,7 +360,7 @@ def _imported_pybullet() -> Any:
             import pybullet
     except ImportError:
         raise MissingDependencyError(
-            "a simulation in PyBullet needs pybullet, which is not installed. With Python 3.11: python -m pip "
+            "PyBullet needs pybullet, which is not installed. With Python 3.11: python -m pip "
             "install pybullet. For newer Pythons there are no wheels; MuJoCo simulates there."
         ) from None
     return pybullet
