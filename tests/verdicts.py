@@ -53,6 +53,7 @@ def passing_data(path: Path) -> dict[str, Any]:
         engines={"pybullet": {"passed": True}},
         solver=None,
         undecided=False,
+        self_collisions=(),
         versions={},
         **planned,
         **bound_to(robot, trajectory),

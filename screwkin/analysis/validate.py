@@ -23,6 +23,7 @@ from screwkin.sim.camera import Camera, Picture
 from screwkin.sim.measure import Slip, ZmpRecord, slip, speed_use, torque_use, zmp_record
 from screwkin.sim.render import pictures
 from screwkin.sim.run import Run, simulate
+from screwkin.sim.self_collision import collisions_of_run
 from screwkin.trajectory import Trajectory, check_joints
 
 _MEASURED = (
@@ -202,6 +203,7 @@ def judged(
         engines={},
         solver=None,
         undecided=False,
+        self_collisions=None if run.engine == "kinematic" else collisions_of_run(robot, trajectory, run),
         run=run,
         zmp=zmp,
     )

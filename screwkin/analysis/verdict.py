@@ -17,6 +17,7 @@ from screwkin.model.robot import Robot
 from screwkin.servo.servo_map import ServoMap
 from screwkin.sim.measure import WINDOW
 from screwkin.sim.run import Schedule
+from screwkin.sim.self_collision import SelfCollision
 from screwkin.trajectory import Trajectory
 
 _FLOORS = ("settle", "hold", "fallen_height")
@@ -51,7 +52,8 @@ class Measured:
     simulated springs, None if rigid; repeated: runs under other conditions.
     engine: names of all engines, joined by ``+``; numbers are the worst of them. By the engine's name:
     engine_settings; engines: what each measured; solver: what finer settings change, None if not tried.
-    undecided: the verdict lies within a solver's own scatter; it has not passed.
+    undecided: the verdict lies within a solver's own scatter; it has not passed. self_collisions: along plan
+    and simulation, beyond what ``home`` has; None where none were looked for.
     """
 
     passed: bool
@@ -89,12 +91,17 @@ class Measured:
     engines: dict[str, dict[str, Any]]
     solver: dict[str, dict[str, Any]] | None
     undecided: bool
+    self_collisions: tuple[SelfCollision, ...] | None
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON data, without what subclasses add."""
         values = {f.name: getattr(self, f.name) for f in fields(Measured)}
         plain = {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
-        return plain | {"criteria": asdict(self.criteria)}
+        collisions = self.self_collisions
+        return plain | {
+            "criteria": asdict(self.criteria),
+            "self_collisions": None if collisions is None else [one.to_dict() for one in collisions],
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,6 +227,10 @@ def reasons_of(facts: Measured, rule: Criteria) -> tuple[str, ...]:
     tired = [f"{name} {100 * use:.0f} %" for name, use in facts.torque_use.items() if use > rule.torque_share]
     if tired:
         reasons.append(f"torque at the servo's limit for {1e3 * WINDOW:.0f} ms: {', '.join(tired)}")
+    if facts.self_collisions is None:
+        reasons.append("self-collisions were not looked for")
+    elif facts.self_collisions:
+        reasons.append(f"links collide: {', '.join(map(str, facts.self_collisions))}")
     return tuple(reasons)
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from screwkin.analysis.account import Account
+from screwkin.errors import needed_for
 from screwkin.files import atomic_path
 
 Figure = Any
@@ -53,8 +54,13 @@ STYLE: Mapping[str, Any] = {
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Pictures drawn inside have the style; nothing global remains changed."""
-    import matplotlib
+    """Pictures drawn inside have the style; nothing global remains changed.
+
+    Raises:
+        MissingDependencyError: matplotlib is not installed.
+    """
+    with needed_for("a picture"):
+        import matplotlib
 
     style: Any = dict(STYLE)
     with matplotlib.rc_context(style):
