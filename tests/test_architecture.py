@@ -36,6 +36,7 @@ FLOORS: dict[str, int] = {
 DRIVERS = {
     "pybullet": "screwkin.sim.pybullet",
     "pybullet_data": "screwkin.sim.pybullet",
+    "mujoco": "screwkin.sim.mujoco",
     "serial": "screwkin.servo.bus",
     "dynamixel_sdk": "screwkin.servo.bus",
 }

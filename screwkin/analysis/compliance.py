@@ -20,9 +20,9 @@ from screwkin.compliance.springs import StiffnessChoice
 from screwkin.errors import InputError
 from screwkin.gait.compensation import WAYS, compensate, way_of
 from screwkin.model.robot import Robot
-from screwkin.sim.compliant import STEP, Compliance, CompliantBackend
+from screwkin.sim.compliant import STEP, Compliance, SpringServos
 from screwkin.sim.measure import ZmpRecord, zmp_record
-from screwkin.sim.pybullet import Physics
+from screwkin.sim.pybullet import Physics, PyBulletBackend
 from screwkin.sim.run import Schedule, simulate
 from screwkin.trajectory import Trajectory
 
@@ -116,7 +116,7 @@ def compliance_study(
 
     Raises:
         MissingDependencyError: pybullet is not installed. Others as of ``compensate`` and
-        ``CompliantBackend``.
+        ``SpringServos``.
     """
     if "compensation" in trajectory.meta:
         raise InputError("the trajectory is compensated already; give the walk as it was planned")
@@ -191,7 +191,7 @@ def _trial(
         sole_damping=conditions.sole_damping,
     )
     compliance = Compliance(stiffness, conditions.joint_damping, conditions.rotor_inertia)
-    backend = CompliantBackend(robot, compliance, physics)
+    backend = PyBulletBackend(robot, physics, servos=SpringServos(robot, compliance, dt))
     try:
         run = simulate(robot, commanded, backend, conditions.schedule)
     finally:

@@ -1,24 +1,26 @@
-"""In what a trajectory is simulated: the engine, and the compliance in it."""
+"""In what a trajectory is simulated: the engines, and the compliance in them."""
 
 from __future__ import annotations
 
+import importlib.util
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, TypeVar
 
 from screwkin.compliance.springs import joint_stiffness
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.gait.compensation import stiffness_of
 from screwkin.model.robot import Robot
 from screwkin.sim.backend import Backend
-from screwkin.sim.compliant import STEP, Compliance, CompliantBackend
+from screwkin.sim.compliant import STEP, Compliance, SpringServos
 from screwkin.sim.kinematic import KinematicBackend
+from screwkin.sim.mujoco import MuJoCoBackend, MuJoCoPhysics
 from screwkin.sim.pybullet import Physics, PyBulletBackend
 from screwkin.trajectory import Trajectory
 
-Engine = Literal["pybullet", "kinematic"]
-ENGINES: tuple[Engine, ...] = ("pybullet", "kinematic")
-PROVING = ("pybullet", "pybullet-compliant", "mujoco")
-"""Names of runs whose contact forces confirm a walk; ``+`` joins the names of two runs."""
+Engine = Literal["auto", "pybullet", "mujoco", "kinematic"]
+ENGINES: tuple[Engine, ...] = ("auto", "pybullet", "mujoco", "kinematic")
+PROVING = ("mujoco", "pybullet")
+"""Engines whose contact forces confirm a walk; ``+`` joins the names of those that agreed."""
 
 
 @dataclass(frozen=True)
@@ -59,22 +61,76 @@ def confirms(engine: str) -> bool:
     return all(name in PROVING for name in engine.split("+"))
 
 
-def opened(robot: Robot, engine: Engine, compliance: SimulatedCompliance, gui: bool) -> Backend:
-    """The simulator of that name, with the robot in it.
+def engines_for(engine: Engine, robot: Robot, compliance: SimulatedCompliance) -> tuple[Engine, ...]:
+    """The engines that a name stands for.
+
+    ``auto`` is every installed engine with contact forces that can simulate the robot and its compliance: two
+    that agree are worth more than one. MuJoCo alone where none is installed, so that its error says so.
 
     Raises:
-        UnknownNameError: no such engine. InputError: it has no contact forces.
-        MissingDependencyError: it is not installed.
+        UnknownNameError: no such engine.
     """
     if engine not in ENGINES:
         raise UnknownNameError("engine", engine, ENGINES)
-    soles = compliance.sole_stiffness
+    if engine != "auto":
+        return (engine,)
+    able: list[Engine] = []
+    if not robot.closures:
+        able.append("pybullet")
+    if compliance.sole_stiffness is None:
+        able.append("mujoco")
+    installed = tuple(name for name in able if importlib.util.find_spec(name) is not None)
+    return installed or tuple(able[-1:]) or ("mujoco",)
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """How much finer than its settings an engine works: parts of a step, and factor on its iterations."""
+
+    step: int = 1
+    iterations: int = 1
+
+
+def opened(
+    robot: Robot,
+    engine: Engine,
+    compliance: SimulatedCompliance,
+    gui: bool = False,
+    finer: Refinement | None = None,
+) -> Backend:
+    """The simulator of that name, with the robot in it.
+
+    Args:
+        robot: to simulate.
+        engine: one of ``engines_for``.
+        compliance: see ``SimulatedCompliance``.
+        gui: show a window.
+        finer: than its usual settings.
+
+    Raises:
+        InputError: it has no contact forces, or no elastic soles.
+        MissingDependencyError: it is not installed.
+    """
+    soles, springs = compliance.sole_stiffness, compliance.servos
     if engine == "kinematic":
-        if compliance.servos is not None or soles is not None:
+        if springs is not None or soles is not None:
             raise InputError(
                 "engine kinematic has no contact forces and cannot simulate compliance; use pybullet"
             )
         return KinematicBackend(robot)
-    if compliance.servos is not None:
-        return CompliantBackend(robot, compliance.servos, Physics(dt=STEP, sole_stiffness=soles), gui)
-    return PyBulletBackend(robot, Physics(sole_stiffness=soles), gui)
+    dt = STEP if springs is not None else None
+    servos = None if springs is None else SpringServos(robot, springs, STEP)
+    if engine == "pybullet":
+        physics = _refined(Physics(sole_stiffness=soles), dt, finer)
+        return PyBulletBackend(robot, physics, gui, servos)
+    if soles is not None:
+        raise InputError("engine mujoco has no elastic soles; use pybullet")
+    return MuJoCoBackend(robot, _refined(MuJoCoPhysics(), dt, finer), gui, servos)
+
+
+P = TypeVar("P", Physics, MuJoCoPhysics)
+
+
+def _refined(physics: P, dt: float | None, finer: Refinement | None) -> P:
+    by, step = finer or Refinement(), dt or physics.dt
+    return replace(physics, dt=step / by.step, iterations=physics.iterations * by.iterations)

@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array
+from screwkin.analysis.agreement import agreed, settled
 from screwkin.analysis.compliance import Conditions, StudyRow, Trial, repeated, summarised
-from screwkin.analysis.engines import Engine, SimulatedCompliance, opened
-from screwkin.analysis.verdict import Criteria, Measured, reasons_of
+from screwkin.analysis.engines import Engine, Refinement, SimulatedCompliance, engines_for, opened
+from screwkin.analysis.verdict import Criteria, Measured, fallen_again, reasons_of
 from screwkin.errors import InputError
 from screwkin.files import text_sha256
 from screwkin.gait.balance import zmp as balance_of
@@ -19,11 +20,20 @@ from screwkin.gait.compensation import way_of
 from screwkin.gait.intended import intended
 from screwkin.model.robot import Robot, robot_text
 from screwkin.sim.camera import Camera, Picture
-from screwkin.sim.compliant import CompliantBackend
 from screwkin.sim.measure import Slip, ZmpRecord, slip, speed_use, torque_use, zmp_record
 from screwkin.sim.render import pictures
 from screwkin.sim.run import Run, simulate
 from screwkin.trajectory import Trajectory, check_joints
+
+_MEASURED = (
+    *("passed", "reasons", "fell", "fell_at", "distance", "end_error_mm", "end_turn_deg", "zmp_rms_mm"),
+    *("zmp_max_mm", "ankle_rms_xy_mm", "slip_mm", "max_tilt_deg", "min_base_height"),
+)
+_FINER = {
+    "usual": Refinement(),
+    "half the step": Refinement(step=2),
+    "twice the iterations": Refinement(iterations=2),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +49,7 @@ class Validation(Measured):
 def validate(
     robot: Robot,
     trajectory: Trajectory,
-    engine: Engine = "pybullet",
+    engine: Engine = "auto",
     *,
     gui: bool = False,
     camera: Camera | None = None,
@@ -47,19 +57,23 @@ def validate(
     compliance: SimulatedCompliance | None = None,
     progress: Callable[[float], None] | None = None,
     motion: Trajectory | None = None,
+    check_solver: bool = False,
 ) -> Validation:
     """Play the trajectory in a simulator and judge what happened.
 
     Args:
         robot: the robot of the trajectory.
         trajectory: what to play.
-        engine: ``pybullet`` (bodies, motors, contacts) or ``kinematic`` (perfect tracking; never passes).
+        engine: ``pybullet`` or ``mujoco`` (bodies, motors, contacts); ``auto``, all of them that are
+            installed, which must agree; or ``kinematic`` (perfect tracking; never passes).
         gui: show a window, in real time.
         camera: take its pictures of what happens; they need neither display nor simulator.
         criteria: what a walk must satisfy.
         compliance: of servos and soles; by default all are rigid. In repeated runs the robot may not fall.
         progress: called now and then with the share done.
         motion: what the joints do instead, as of servos that were measured; judged against the trajectory.
+        check_solver: simulate at half the step and at twice the iterations too; a verdict that this changes,
+            or that lies within what it changes, is undecided and has not passed.
 
     Returns:
         Validation: ``passed``, ``reasons`` and what was measured.
@@ -78,18 +92,37 @@ def validate(
     _check_fit(robot, trajectory)
     rule, report = criteria or Criteria(), progress or (lambda share: None)
     compliance = (compliance or SimulatedCompliance()).for_trajectory(robot, trajectory)
-    first = 0.2 if compliance.repeat else 1.0
-    backend = opened(robot, engine, compliance, gui)
-    try:
-        run = simulate(
-            robot, motion or trajectory, backend, rule.schedule, lambda share: report(first * share)
-        )
-    finally:
-        backend.close()
-    taken = film(robot, trajectory, run, camera) if camera else ()
-    check = replace(judged(robot, trajectory, run, rule, compliance), pictures=taken)
+    names = engines_for(engine, robot, compliance)
+    ways = _FINER if check_solver and names != ("kinematic",) else {"usual": Refinement()}
+    first = (0.2 if compliance.repeat else 1.0) / (len(names) * len(ways))
+    done = 0
+
+    def played(name: Engine, finer: Refinement) -> Validation:
+        nonlocal done
+        backend = opened(robot, name, compliance, gui and not done, finer)
+        try:
+            run = simulate(
+                robot,
+                motion or trajectory,
+                backend,
+                rule.schedule,
+                lambda share: report(first * (done + share)),
+            )
+        finally:
+            backend.close()
+        done += 1
+        return judged(robot, trajectory, run, rule, compliance)
+
+    checks = []
+    for name in names:
+        usual, *others = [played(name, way) for way in ways.values()]
+        finer = dict(zip(list(ways)[1:], others, strict=True))
+        checks.append(settled(usual, finer, lambda check: reasons_of(check, rule)) if finer else usual)
+    check = agreed(checks)
+    check = replace(check, pictures=film(robot, trajectory, check.run, camera) if camera else ())
     if not compliance.repeat or compliance.servos is None:
         return check
+    first = 0.2
     conditions = Conditions(sole_stiffness=compliance.sole_stiffness)
 
     def later(share: float) -> None:
@@ -101,9 +134,8 @@ def validate(
 def _repeated(check: Validation, trials: Sequence[Trial]) -> Validation:
     """The verdict with repeated runs, none of which may fall."""
     (row,) = summarised(trials)
-    check = replace(check, repeated=row.to_dict(), study=row)
-    reasons = (*_unmeasured(check.run), *reasons_of(check, check.criteria))
-    return replace(check, reasons=reasons, passed=not reasons)
+    reasons = (*check.reasons, *fallen_again(row.to_dict()))
+    return replace(check, repeated=row.to_dict(), study=row, reasons=reasons, passed=not reasons)
 
 
 def film(robot: Robot, trajectory: Trajectory, run: Run, camera: Camera) -> tuple[Picture, ...]:
@@ -143,8 +175,6 @@ def judged(
         reasons=(),
         warnings=_warnings(robot, trajectory, run, slipped, speed),
         engine=run.engine,
-        engine_settings={"dt": run.dt},
-        servo="rigid" if springs is None else "springs",
         criteria=criteria,
         fell=run.fallen_at is not None,
         fell_at=run.fallen_at,
@@ -166,11 +196,18 @@ def judged(
         joint_stiffness=dict(springs) if isinstance(springs, Mapping) else None,
         sole_stiffness=compliance.sole_stiffness,
         repeated=None,
+        servo=run.servo,
+        engine_settings={run.engine: dict(run.settings)},
+        engines={},
+        solver=None,
+        undecided=False,
         run=run,
         zmp=zmp,
     )
     reasons = (*_unmeasured(run), *reasons_of(facts, criteria))
-    return replace(facts, passed=not reasons, reasons=reasons)
+    check = replace(facts, passed=not reasons, reasons=reasons)
+    measured = check.to_dict()
+    return replace(check, engines={run.engine: {name: measured[name] for name in _MEASURED}})
 
 
 def planned_facts(robot: Robot, trajectory: Trajectory) -> dict[str, Any]:
@@ -211,7 +248,7 @@ def _warnings(robot: Robot, trajectory: Trajectory, run: Run, slipped: Slip, spe
             f"judged with another table of {robot.name} than the one that the trajectory records; it cannot "
             "be sent with this verdict"
         )
-    if way_of(trajectory) != "none" and run.engine != CompliantBackend.name:
+    if way_of(trajectory) != "none" and run.servo == "rigid":
         warnings.append("commands that allow for elastic servos, simulated on rigid ones")
     fast = [
         f"{joint.name} {use * joint.velocity:.1f} of {joint.velocity:.1f} rad/s"

@@ -30,11 +30,12 @@ FEWEST, MOST = 30, 120
 class Wish:
     """What a simulation is to be: engine, a window, a film, pictures and page; commands for the page.
 
-    compliance: see ``validate``. motion: what the joints do instead of the trajectory; criteria: what
-    a walk must satisfy; more: draws further pictures once the verdict is written.
+    check_solver, compliance: see ``validate``. motion: what the joints do instead of the trajectory;
+    criteria: what a walk must satisfy; more: draws further pictures once the verdict is written.
     """
 
-    engine: str = "pybullet"
+    engine: str = "auto"
+    check_solver: bool = False
     gui: bool = False
     video: bool = False
     plots: bool = True
@@ -71,6 +72,7 @@ def simulate_to_files(account: Account, folder: Path, verdict: Path, wish: Wish)
             compliance=wish.compliance,
             progress=done,
             motion=wish.motion,
+            check_solver=wish.check_solver,
         )
     with atomic_write(verdict) as file:
         data = verdict_of(account.robot, trajectory, check).to_dict()
@@ -87,8 +89,8 @@ def simulate_to_files(account: Account, folder: Path, verdict: Path, wish: Wish)
 
 
 def print_verdict(check: Validation) -> None:
-    """Passed, or not with every reason; warnings on stderr."""
-    print("passed" if check.passed else "NOT passed:")
+    """Passed, or not or undecided with every reason; warnings on stderr."""
+    print("passed" if check.passed else "UNDECIDED:" if check.undecided else "NOT passed:")
     for reason in check.reasons:
         print(f"  {reason}")
     for warning in check.warnings:

@@ -28,8 +28,11 @@ from screwkin.trajectory import load_trajectory
 def validate(
     trajectory: TrajectoryPath,
     engine: Annotated[
-        str, typer.Option(help="pybullet, or kinematic (no forces; never passes).")
-    ] = "pybullet",
+        str,
+        typer.Option(
+            help="pybullet, mujoco, kinematic (no forces; never passes), or auto: those with forces."
+        ),
+    ] = "auto",
     gui: Annotated[bool, typer.Option("--gui", help="Show a window, at the robot's own speed.")] = False,
     video: Annotated[bool, typer.Option("--video", help="Film it: walk.gif.")] = False,
     compliant: Annotated[
@@ -51,6 +54,10 @@ def validate(
         bool,
         typer.Option("--repeat", help="With --compliant: also under other frictions and time steps."),
     ] = False,
+    check_solver: Annotated[
+        bool,
+        typer.Option("--check-solver", help="Also at half the step and twice the iterations."),
+    ] = False,
     plots: Annotated[bool, typer.Option(help="Draw the pictures and write the report.")] = True,
     log: Annotated[
         Path | None,
@@ -71,7 +78,7 @@ def validate(
             raise InputError(
                 "--log replays servos that moved; it goes without --compliant and --sole-stiffness"
             )
-        return replay(trajectory, log, Wish(engine, gui, video, plots), output, as_json)
+        return replay(trajectory, log, Wish(engine, check_solver, gui, video, plots), output, as_json)
     loaded = load_trajectory(trajectory)
     account = account_of(recorded_robot(loaded, str(trajectory)), loaded)
     compliance.for_trajectory(account.robot, loaded)  # refused before anything is written
@@ -81,10 +88,11 @@ def validate(
         "validate",
         str(trajectory),
         *_changes(engine, compliance, k),
+        *(["--check-solver"] * check_solver),
         *(["--video"] * video),
     ]
     commands = _commands(str(loaded.meta.get("command", "")), words)
-    wish = Wish(engine, gui, video, plots, commands, compliance)
+    wish = Wish(engine, check_solver, gui, video, plots, commands, compliance)
     with output_folder(output or beside, "validate", account.robot.name) as folder:
         check = simulate_to_files(account, folder, beside / "validation.json", wish)
     if as_json:
@@ -119,7 +127,7 @@ def _compliance(
 
 def _changes(engine: str, compliance: SimulatedCompliance, k: float | None) -> list[str]:
     """The options that ask for another simulation than the usual one."""
-    words = ["--engine", engine] if engine != "pybullet" else []
+    words = ["--engine", engine] if engine != "auto" else []
     words += ["--compliant"] if compliance.servos is not None else []
     words += [] if k is None else ["--stiffness", f"{k:g}"]
     words += (

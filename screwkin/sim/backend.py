@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Protocol
+
+import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.model.state import State
@@ -50,10 +53,20 @@ class Observation:
     contacts: tuple[Contact, ...]
 
 
+def moment_about_origin(point: Array, force: Array) -> Array:
+    """Moment (3,) [N m] about the world origin of a force at a point; ``np.cross`` is ten times slower."""
+    (u, v, w), (x, y, z) = point.tolist(), force.tolist()
+    return np.array([v * z - w * y, w * x - u * z, u * y - v * x])
+
+
 class Backend(Protocol):
     """A simulated or real robot. Joints stand in table order everywhere."""
 
     name: str
+    servo: str
+    """What its servos are: ``rigid``, ``springs``, …"""
+    settings: Mapping[str, Any]
+    """Of its solver, as JSON data, with ``remarks`` on what it changes of the robot."""
     dt: float
     """Duration of one step [s]."""
 

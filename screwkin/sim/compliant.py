@@ -1,23 +1,23 @@
-"""Elastic servos in PyBullet: every joint is a spring and a damper between its command and its link.
+"""Elastic servos: every joint is a spring and a damper between its command and its link.
 
-Position control in PyBullet is a constraint on velocities, which no static load deflects; it cannot stand for
-an elastic servo. Here the joint's torque is k (q_cmd - q) + d (qd_cmd - qd), held for one step, within the
-servo's effort. The explicit step needs a short dt and links that are not too light: the reflected inertia of
-the servos' rotors stands for that.
+A rigid servo is a constraint on rates, which no static load deflects; it cannot stand for an elastic one.
+Here the joint's torque is k (q_cmd - q) + d (qd_cmd - qd), held for one step, within the servo's effort. The
+explicit step needs a short dt and links that are not too light: the inertia of the servos' rotors, as seen at
+the joint, stands for that.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
+from screwkin.algebra.arrays import Array
 from screwkin.compliance.springs import StiffnessChoice, joint_stiffness
 from screwkin.errors import InputError
 from screwkin.model.robot import Robot
-from screwkin.model.state import State
-from screwkin.sim.backend import Command, Observation
-from screwkin.sim.pybullet import Physics, PyBulletBackend
+from screwkin.sim.backend import Command
+from screwkin.sim.drive import Actuation
 
 STEP = 5e-4
 """Duration of a step by default [s]."""
@@ -27,8 +27,8 @@ STEP = 5e-4
 class Compliance:
     """Springs and dampers of the joints in a simulation.
 
-    stiffness: see ``joint_stiffness``; damping: [N m s/rad]; rotor_inertia: least inertia of a link about
-    each axis [kg m^2].
+    stiffness: see ``joint_stiffness``; damping: [N m s/rad]; rotor_inertia: of every rotor about its joint's
+    axis [kg m^2].
     """
 
     stiffness: StiffnessChoice = None
@@ -42,50 +42,31 @@ class Compliance:
             raise InputError(f"rotor_inertia is {self.rotor_inertia!r}; it must be a finite number above 0")
 
 
-class CompliantBackend(PyBulletBackend):
-    """The robot in PyBullet with springs for servos."""
+class SpringServos:
+    """Springs and dampers for servos, in any engine."""
 
-    name = "pybullet-compliant"
+    name = "springs"
 
-    def __init__(
-        self,
-        robot: Robot,
-        compliance: Compliance | None = None,
-        physics: Physics | None = None,
-        gui: bool = False,
-    ) -> None:
-        """Connect and build the world.
+    def __init__(self, robot: Robot, compliance: Compliance, dt: float = STEP) -> None:
+        """Springs that steps of dt [s] can simulate.
 
         Raises:
-            MissingDependencyError: pybullet is not installed.
-            InputError: see ``PyBulletBackend`` and ``joint_stiffness``; or the step is too long for springs
-                so stiff on links so light.
+            InputError: see ``joint_stiffness``; or the step is too long for springs so stiff on rotors so
+                light.
         """
-        springs = compliance or Compliance()
-        physics = physics or Physics(dt=STEP)
-        self._k, self._d = joint_stiffness(robot, springs.stiffness), springs.damping
-        _check_step(float(self._k.max()), springs, physics.dt)
-        super().__init__(robot.with_inertia_floor(inertia=springs.rotor_inertia), physics, gui)
-        self._limit = np.array(self._efforts)
-        self._torque = np.zeros_like(self._k)
+        self._k, self._d = joint_stiffness(robot, compliance.stiffness), compliance.damping
+        _check_step(float(self._k.max()), compliance, dt)
+        self.rotor_inertia = np.full(len(robot.joints), compliance.rotor_inertia)
+        self._effort = np.array([joint.effort for joint in robot.joints], dtype=float)
+        self._free = np.zeros(len(robot.joints))
 
-    def reset(self, state: State) -> Observation:
-        """Place the robot at rest in a state, its springs relaxed, and time at 0."""
-        self._torque = np.zeros_like(self._k)
-        return super().reset(state)
+    def reset(self, q: Array) -> None:
+        """Springs are relaxed by the command that comes next."""
 
-    def _drive(self, command: Command) -> None:
-        joints = self._p.getJointStates(self._body, self._joints, **self._here)
-        q, qd = np.array([joint[:2] for joint in joints]).T
+    def actuate(self, q: Array, qd: Array, motor: Array, command: Command, dt: float) -> Actuation:
+        """The springs' torque; no motor."""
         torque = self._k * (command.q - q) + self._d * (command.qd - qd)
-        self._torque = np.clip(torque, -self._limit, self._limit)
-        self._p.setJointMotorControlArray(
-            self._body, self._joints, self._p.TORQUE_CONTROL, forces=self._torque.tolist(), **self._here
-        )
-
-    def observe(self) -> Observation:
-        """The state after the last step, with the springs' torques, which PyBullet does not report."""
-        return replace(super().observe(), torque=self._torque)
+        return Actuation(np.clip(torque, -self._effort, self._effort), self._free, self._free)
 
 
 def _check_step(k: float, springs: Compliance, dt: float) -> None:

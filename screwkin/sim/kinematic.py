@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from screwkin.algebra.arrays import Array
@@ -17,9 +20,11 @@ class KinematicBackend:
     """Perfect tracking of joints and base, without forces."""
 
     name = "kinematic"
+    servo = "rigid"
 
     def __init__(self, robot: Robot, dt: float = 0.01) -> None:
         self.dt = dt
+        self.settings: Mapping[str, Any] = {"dt": dt}
         self._robot = robot
         self._legs = [limb.tip for limb in robot.limbs if limb.kind == "leg"]
         self._steps = 0

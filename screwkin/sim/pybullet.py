@@ -14,8 +14,8 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,19 +27,16 @@ from screwkin.errors import InputError, MissingDependencyError
 from screwkin.model.robot import Limb, Robot
 from screwkin.model.state import State
 from screwkin.model.urdf import urdf_frames, urdf_from_robot
-from screwkin.sim.backend import Command, Contact, Observation
+from screwkin.sim.backend import Command, Contact, Observation, moment_about_origin
 from screwkin.sim.camera import Camera
-
-UNLIMITED = 1e9
-"""Stands for an infinite effort [N m], which the solver cannot compute with."""
+from screwkin.sim.drive import UNLIMITED, RigidServos, Servos
 
 
 @dataclass(frozen=True)
 class Physics:
     """Settings of the simulation.
 
-    dt [s]; iterations of the constraint solver per step; friction between soles and floor; gains of the
-    joints' position control (dimensionless: the share of an error that one step removes); gravity [m/s^2];
+    dt [s]; iterations of the constraint solver per step; friction between soles and floor; gravity [m/s^2];
     sole_stiffness [N/m] and sole_damping [N s/m] of every point in which a leg's last link touches the floor,
     None for rigid soles.
     """
@@ -47,8 +44,6 @@ class Physics:
     dt: float = 1e-3
     iterations: int = 200
     friction: float = 1.0
-    position_gain: float = 0.5
-    velocity_gain: float = 1.0
     gravity: float = 9.81
     sole_stiffness: float | None = None
     sole_damping: float = 20.0
@@ -70,8 +65,20 @@ class PyBulletBackend:
 
     name = "pybullet"
 
-    def __init__(self, robot: Robot, physics: Physics | None = None, gui: bool = False) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        physics: Physics | None = None,
+        gui: bool = False,
+        servos: Servos | None = None,
+    ) -> None:
         """Connect and build the world.
+
+        Args:
+            robot: an open tree.
+            physics: see ``Physics``.
+            gui: show a window.
+            servos: of the joints; rigid by default.
 
         Raises:
             MissingDependencyError: pybullet is not installed.
@@ -79,11 +86,14 @@ class PyBulletBackend:
                 so elastic, or there is no display for ``gui``.
         """
         self._robot = robot
+        self._servos = servos or RigidServos(robot)
+        self.servo = self._servos.name
         self._physics = physics or Physics()
         _check_soles(self._physics)
         self.dt = self._physics.dt
+        self.settings: Mapping[str, Any] = asdict(self._physics)
         _check_feet(robot)
-        urdf = urdf_from_robot(robot.with_inertia_floor())
+        urdf = urdf_from_robot(_with_rotors(robot.with_inertia_floor(), self._servos.rotor_inertia))
         self._p = _imported_pybullet()
         self._client = _connected(self._p, gui)
         self._here = {"physicsClientId": self._client}
@@ -94,7 +104,7 @@ class PyBulletBackend:
         self._link_names = [robot.base_link, *(info[12].decode() for info in self._joint_infos())]
         names = [info[1].decode() for info in self._joint_infos()]
         self._joints = [names.index(name) for name in robot.joint_names]
-        self._efforts = [min(joint.effort, UNLIMITED) for joint in robot.joints]
+        self._applied = np.zeros(len(names))
         self._release()
         info = self._p.getDynamicsInfo(self._body, -1, **self._here)
         self._T_base_inertial = self._pose(info[3], info[4])
@@ -196,6 +206,8 @@ class PyBulletBackend:
         p.resetBaseVelocity(self._body, [0.0] * 3, [0.0] * 3, **here)
         for index, q in zip(self._joints, np.asarray(state.q, dtype=float).tolist(), strict=True):
             p.resetJointState(self._body, index, q, 0.0, **here)
+        self._servos.reset(np.array(state.q, dtype=float))
+        self._applied = np.zeros(len(self._joints))
         self._steps = 0
         if self._began is not None:
             self._began = time.monotonic()
@@ -210,19 +222,25 @@ class PyBulletBackend:
             self._show(self._began)
 
     def _drive(self, command: Command) -> None:
-        """Set the motors for one step: every joint under position and velocity control within its effort."""
-        p, n = self._p, len(self._joints)
+        """Set the motors for one step, each a constraint on its rate within a bound, and apply torques."""
+        p, here = self._p, self._here
+        states = p.getJointStates(self._body, self._joints, **here)
+        q, qd = np.array([state[:2] for state in states]).T
+        motor = np.array([state[3] for state in states])
+        action = self._servos.actuate(q, qd, motor, command, self.dt)
         p.setJointMotorControlArray(
             self._body,
             self._joints,
-            p.POSITION_CONTROL,
-            targetPositions=np.asarray(command.q).tolist(),
-            targetVelocities=np.asarray(command.qd).tolist(),
-            forces=self._efforts,
-            positionGains=[self._physics.position_gain] * n,
-            velocityGains=[self._physics.velocity_gain] * n,
-            **self._here,
+            p.VELOCITY_CONTROL,
+            targetVelocities=action.rate.tolist(),
+            forces=np.minimum(action.bound, UNLIMITED).tolist(),
+            **here,
         )
+        self._applied = action.torque
+        if action.torque.any():
+            p.setJointMotorControlArray(
+                self._body, self._joints, p.TORQUE_CONTROL, forces=action.torque.tolist(), **here
+            )
 
     def _show(self, began: float) -> None:
         """Keep a window's camera on the robot, and its time no faster than the world's."""
@@ -243,7 +261,7 @@ class PyBulletBackend:
             T_world_base=self._pose(position, quat_xyzw) @ self._T_inertial_base,
             q=np.array([joint[0] for joint in joints]),
             qd=np.array([joint[1] for joint in joints]),
-            torque=np.array([joint[3] for joint in joints]),
+            torque=self._applied + [joint[3] for joint in joints],
             T_world_foot=np.array(
                 [
                     self._pose(link[4], link[5]) @ foot.T_link_tip
@@ -283,7 +301,7 @@ class PyBulletBackend:
             force = force + motor * foot.axis_in_inertial
         T = self._pose(link[0], link[1])
         f = np.array([0.0, 0.0, foot.mass * self._physics.gravity]) - T[:3, :3] @ force
-        return np.concatenate([_cross(T[:3, 3], f) - T[:3, :3] @ moment, f])
+        return np.concatenate([moment_about_origin(T[:3, 3], f) - T[:3, :3] @ moment, f])
 
     def close(self) -> None:
         """Disconnect; closing twice is harmless."""
@@ -302,18 +320,31 @@ def _check_feet(robot: Robot) -> None:
         )
 
 
+def _with_rotors(robot: Robot, rotors: Array) -> Robot:
+    """The robot with a massless ball on every link, whose inertia is that of the rotor at its joint.
+
+    PyBullet knows no rotors that turn with a joint alone. The ball's inertia across the axis, and a base no
+    lighter than the largest ball, steady stiff springs between light links, which would swing up.
+    """
+    if not rotors.any():
+        return robot
+    links = {link.name: link for link in robot.links}
+    links[robot.base_link] = robot.with_inertia_floor(inertia=float(rotors.max())).link(robot.base_link)
+    for joint, rotor in zip(robot.joints, rotors.tolist(), strict=True):
+        if rotor and joint.type != "revolute":
+            raise InputError(f"PyBullet has no rotor at joint {joint.name}, which does not turn")
+        i = links[joint.child].inertia
+        ball = replace(i, xx=i.xx + rotor, yy=i.yy + rotor, zz=i.zz + rotor)
+        links[joint.child] = replace(links[joint.child], inertia=ball)
+    return replace(robot, links=tuple(links.values()))
+
+
 def _check_soles(physics: Physics) -> None:
     k, d = physics.sole_stiffness, physics.sole_damping
     if k is not None and not (np.isfinite(k) and k > 0):
         raise InputError(f"sole_stiffness is {k!r}; it must be a positive number in N/m, or None")
     if not (np.isfinite(d) and d >= 0):
         raise InputError(f"sole_damping is {d!r}; it must be a finite number of at least 0 in N s/m")
-
-
-def _cross(a: Array, b: Array) -> Array:
-    """Vector product of two triples; ``np.cross`` takes ten times as long for so little."""
-    (u, v, w), (x, y, z) = a.tolist(), b.tolist()
-    return np.array([v * z - w * y, w * x - u * z, u * y - v * x])
 
 
 def _quat_xyzw(R: Array) -> list[float]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,6 +35,7 @@ class Schedule:
 class Run:
     """What happened, one row per step; rows are at the end of their step.
 
+    engine, servo, settings: see ``Backend``; dt [s];
     time (K,) [s] of the trajectory, negative while settling; planned_base, T_world_base (K, 4, 4);
     q_planned, q, qd, torque (K, n); T_world_foot (K, feet, 4, 4); ground_wrench (K, 6): [m; f] of all
     contacts about the world origin; foot_force (K, feet, 3) of the contacts of the legs' last links;
@@ -43,6 +44,8 @@ class Run:
     """
 
     engine: str
+    servo: str
+    settings: Mapping[str, Any]
     dt: float
     time: Array
     planned_base: Array
@@ -106,6 +109,8 @@ def simulate(
     rows = len(seen)
     return Run(
         engine=backend.name,
+        servo=backend.servo,
+        settings=dict(backend.settings),
         dt=dt,
         time=times[1 : rows + 1],
         planned_base=planned[1 : rows + 1],

@@ -102,7 +102,8 @@ def test_the_verdict_is_json_with_the_fields_of_the_contract(check: Validation, 
     data = json.loads(json.dumps(check.to_dict(), allow_nan=False))
     assert set(data) >= FIELDS
     assert data["trajectory_sha256"] == walk.sha256
-    assert data["engine"] == "pybullet"
+    assert data["engine"] == "pybullet+mujoco"
+    assert set(data["engines"]) == set(data["engine_settings"]) == {"pybullet", "mujoco"}
     assert data["planned_distance"] == pytest.approx(walk.T_world_base[-1, 0, 3] - walk.T_world_base[0, 0, 3])
     assert data["distance"] == pytest.approx(data["planned_distance"], abs=1e-3)
     assert data["min_margin_mm"] == pytest.approx(1e3 * walk.margin.min())
@@ -144,7 +145,7 @@ def test_weak_servos_do_not_carry_the_robot(robot: Robot, walk: Trajectory) -> N
 def test_the_kinematic_engine_tracks_exactly_but_confirms_nothing(robot: Robot, walk: Trajectory) -> None:
     check = validate(robot, walk, engine="kinematic")
     assert not check.passed
-    assert check.reasons == ("engine kinematic simulates no forces and confirms nothing; use pybullet",)
+    assert check.reasons == ("engine kinematic simulates no forces and confirms nothing; use mujoco",)
     assert check.end_error_mm < 1e-9
     assert check.zmp_rms_mm is None
     assert check.zmp_max_mm is None
@@ -250,7 +251,9 @@ def test_walks_of_edited_robots_record_the_edited_table(robot: Robot) -> None:
 
 
 def test_unknown_engines_and_foreign_trajectories_are_refused(robot: Robot, walk: Trajectory) -> None:
-    with pytest.raises(UnknownNameError, match=r"unknown engine 'gazebo'; valid: pybullet, kinematic"):
+    with pytest.raises(
+        UnknownNameError, match=r"unknown engine 'gazebo'; valid: auto, pybullet, mujoco, kinematic"
+    ):
         validate(robot, walk, engine="gazebo")  # type: ignore[arg-type]
     names = ("head", *walk.joint_names[1:])
     with pytest.raises(InputError, match=r"joints are not those of bioloid: .* the foreign head"):

@@ -154,7 +154,7 @@ def test_strange_remarks_in_meta_do_no_harm(cli, changed):
 
 def test_an_unknown_engine_is_refused_before_anything_is_simulated(cli, refused, walked):
     message = refused(cli("validate", walked / "trajectory.npz", "--engine", "gazebo"), 2)
-    assert "unknown engine 'gazebo'; valid: pybullet, kinematic" in message
+    assert "unknown engine 'gazebo'; valid: auto, pybullet, mujoco, kinematic" in message
 
 
 @pytest.mark.parametrize(
@@ -186,7 +186,7 @@ def test_elastic_servos_stand_with_compensated_commands_and_tell_every_run(cli, 
     called = cli("validate", "out/compensated/trajectory.npz", "--compliant", "--repeat", "--no-plots")
     assert called.code == 0, called.out + called.err
     told = json.loads((tmp_path / "out/compensated/validation.json").read_text(encoding="utf-8"))
-    assert told["engine"] == "pybullet-compliant"
+    assert (told["engine"], told["servo"]) == ("pybullet+mujoco", "springs")
     assert told["compensation"] == "joint"
     assert set(told["joint_stiffness"].values()) == {100.0}
     repeated = told["repeated"]
@@ -255,7 +255,7 @@ def test_the_paper_s_walk_passes_and_all_fields_are_told(validated):
     assert told["reasons"] == []
     assert set(FIELDS) <= set(told)
     assert told["fell"] is False
-    assert told["engine"] == "pybullet"
+    assert told["engine"] == "pybullet+mujoco"
     assert told["distance"] == pytest.approx(0.2, abs=0.002)
 
 

@@ -13,12 +13,12 @@ from screwkin.compliance.stiffness import static_deflection
 from screwkin.errors import InputError
 from screwkin.model.robot import Robot
 from screwkin.sim.backend import Command, Observation
-from screwkin.sim.compliant import Compliance, CompliantBackend
+from screwkin.sim.compliant import STEP, Compliance, SpringServos
 from screwkin.sim.pybullet import Physics, PyBulletBackend
 
 pytest.importorskip("pybullet")
 
-Open = Callable[..., CompliantBackend]
+Open = Callable[..., PyBulletBackend]
 
 
 @pytest.fixture(scope="module")
@@ -28,10 +28,11 @@ def robot() -> Robot:
 
 @pytest.fixture
 def opened() -> Iterator[Open]:
-    backends: list[CompliantBackend] = []
+    backends: list[PyBulletBackend] = []
 
-    def open_one(robot: Robot, yields: Compliance, physics: Physics | None = None) -> CompliantBackend:
-        backends.append(CompliantBackend(robot, yields, physics))
+    def open_one(robot: Robot, yields: Compliance, physics: Physics | None = None) -> PyBulletBackend:
+        physics = physics or Physics(dt=STEP)
+        backends.append(PyBulletBackend(robot, physics, servos=SpringServos(robot, yields, physics.dt)))
         return backends[-1]
 
     yield open_one
@@ -39,7 +40,7 @@ def opened() -> Iterator[Open]:
         backend.close()
 
 
-def stand(backend: CompliantBackend, state: sk.State, steps: int) -> Observation:
+def stand(backend: PyBulletBackend, state: sk.State, steps: int) -> Observation:
     """Hold the commands of a state for some steps."""
     hold = Command(state.q, np.zeros_like(state.q), state.T_world_base)
     for _ in range(steps):
@@ -128,7 +129,7 @@ def test_impossible_soles_are_refused(robot: Robot, change: dict[str, float], me
 )
 def test_impossible_springs_are_refused(robot: Robot, change: dict[str, float], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        CompliantBackend(robot, Compliance(**{"stiffness": 100.0, **change}))
+        SpringServos(robot, Compliance(**{"stiffness": 100.0, **change}))
 
 
 def test_the_longest_step_is_where_a_link_on_a_spring_begins_to_swing_up() -> None:

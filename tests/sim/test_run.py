@@ -32,6 +32,8 @@ class Scripted:
     poses: list[np.ndarray]
     joints: int
     name: str = "scripted"
+    servo: str = "rigid"
+    settings: dict[str, object] = field(default_factory=dict)
     dt: float = 0.01
     commands: list[Command] = field(default_factory=list)
 

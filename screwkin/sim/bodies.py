@@ -1,0 +1,120 @@
+"""The bodies of a robot for an engine in joint coordinates: massless brackets merged, light links raised.
+
+An engine whose coordinates are the joints' own needs no body between two joints: a massless bracket with one
+joint above and one below is no body but a place where two axes meet, so both joints go to the next link. That
+is exact. A massless link at which something else hangs (a closure, a tip, a box, several links or none) stays
+a body; it gets a mass and an inertia, since no engine divides by nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import Pose, Vector, as_array
+from screwkin.model.robot import Joint, Link, Robot
+
+LEAST = 1e-12
+"""Mass [kg] and principal inertia [kg m^2] below which a moving body is too light for an engine."""
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A link with the joints between it and its parent, the parent's side first.
+
+    frame: (4, 4) of the link in the zero pose, in base axes; the base link's is the base frame.
+    """
+
+    link: Link
+    parent: str | None
+    joints: tuple[Joint, ...]
+    frame: Array
+
+    @cached_property
+    def to_frame(self) -> Array:
+        """T_link_base (4, 4) in the zero pose."""
+        R, p = self.frame[:3, :3], self.frame[:3, 3]
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = R.T, -R.T @ p
+        return T
+
+    def point(self, p: Vector) -> Array:
+        """A point of base axes, in the link's frame (3,) [m]."""
+        return self.to_frame[:3, :3] @ as_array(p) + self.to_frame[:3, 3]
+
+    def direction(self, s: Vector) -> Array:
+        """A direction of base axes, in the link's frame (3,)."""
+        return self.to_frame[:3, :3] @ as_array(s)
+
+    def pose(self, T: Pose) -> Array:
+        """A frame of base axes, in the link's frame (4, 4)."""
+        return self.to_frame @ as_array(T)
+
+    @property
+    def inertia(self) -> Array:
+        """About the CoM, in the link's axes (3, 3) [kg m^2]."""
+        i, R = self.link.inertia, self.frame[:3, :3]
+        return R.T @ np.array([[i.xx, i.xy, i.xz], [i.xy, i.yy, i.yz], [i.xz, i.yz, i.zz]], dtype=float) @ R
+
+
+def bodies_of(robot: Robot) -> tuple[tuple[Body, ...], tuple[str, ...]]:
+    """The bodies of a robot, parents first, and a remark on every link that is not the table's.
+
+    Args:
+        robot: of numbers.
+
+    Returns:
+        Bodies, and one sentence for each kind of change: links merged into the next, links given a mass.
+    """
+    merged = {name for name in robot.link_names if _is_bracket(robot, name)}
+    light = {
+        link.name
+        for link in robot.links
+        if link.name not in merged and _moves(robot, link) and _is_light(link)
+    }
+    floored = {link.name: link for link in robot.with_inertia_floor().links if link.name in light}
+    frames = {name: as_array(robot.frame(name)[1]) for name in robot.link_names}
+    bodies = [Body(floored.get(robot.base_link, robot.link(robot.base_link)), None, (), np.eye(4))]
+    above: dict[str, tuple[str, tuple[Joint, ...]]] = {}
+    for joint in (robot.joints[i] for i in robot.traversal):
+        parent, joints = above.get(joint.parent, (joint.parent, ()))
+        if joint.child in merged:
+            above[joint.child] = (parent, (*joints, joint))
+            continue
+        link = floored.get(joint.child, robot.link(joint.child))
+        bodies.append(Body(link, parent, (*joints, joint), frames[joint.child]))
+    return tuple(bodies), _remarks(sorted(merged), [body.link for body in bodies if body.link.name in light])
+
+
+def _is_bracket(robot: Robot, name: str) -> bool:
+    """Whether a link is but a place between two joints, with nothing of its own."""
+    link, below = robot.link(name), [joint for joint in robot.joints if joint.parent == name]
+    held = {limb.link for limb in robot.limbs} | {
+        end for closure in robot.closures for end in (closure.link_a, closure.link_b)
+    }
+    massless = link.mass == 0 and not any(vars(link.inertia).values())
+    return massless and not link.boxes and name not in held and name != robot.base_link and len(below) == 1
+
+
+def _moves(robot: Robot, link: Link) -> bool:
+    return robot.base == "floating" or link.name != robot.base_link
+
+
+def _is_light(link: Link) -> bool:
+    i = link.inertia
+    I = np.array([[i.xx, i.xy, i.xz], [i.xy, i.yy, i.yz], [i.xz, i.yz, i.zz]], dtype=float)  # noqa: E741
+    return float(link.mass) < LEAST or float(np.linalg.eigvalsh(I)[0]) < LEAST
+
+
+def _remarks(merged: Sequence[str], light: Sequence[Link]) -> tuple[str, ...]:
+    remarks = []
+    if merged:
+        remarks.append(f"massless links merged into the next one: {', '.join(merged)}")
+    if light:
+        names = ", ".join(link.name for link in light)
+        remarks.append(f"links without mass or inertia given 1e-6 kg and 1e-6 kg m^2 at least: {names}")
+    return tuple(remarks)

@@ -1,0 +1,370 @@
+"""The robot in MuJoCo: rigid bodies, motors and contacts. The only file that imports mujoco.
+
+The model is built from the table: bodies are links in the table's frames (see ``sim.bodies``), the geometry
+in contact is that of the table's boxes and soles, loops are closed by welds. A motor is dry friction against
+a moving reference: MuJoCo's friction constraint of a joint, whose force is bounded, asks for rate zero; here
+it asks for the rate that the servo wants. So a rigid servo is a velocity constraint within its effort, as in
+PyBullet, solved together with the contacts.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import as_array
+from screwkin.errors import InputError, MissingDependencyError
+from screwkin.model.robot import Joint, Robot
+from screwkin.model.state import State
+from screwkin.sim.backend import Command, Contact, Observation, moment_about_origin
+from screwkin.sim.bodies import Body, bodies_of
+from screwkin.sim.drive import UNLIMITED, RigidServos, Servos
+
+STIFFEST = 0.9999
+"""Largest impedance of a constraint that MuJoCo takes: the share of it that is not regularised away."""
+CORNER = 1e-4
+"""Radius [m] of the spheres that stand for the corners of a sole that no box has."""
+
+
+@dataclass(frozen=True)
+class MuJoCoPhysics:
+    """Settings of the simulation.
+
+    dt [s]; iterations and tolerance of the constraint solver per step; friction between soles and floor;
+    cone: ``elliptic``, or ``pyramidal`` as the solver's friction cone; impratio: how much harder friction is
+    than contact; contact_time [s] and contact_impedance of contacts; gravity [m/s^2].
+    """
+
+    dt: float = 1e-3
+    iterations: int = 100
+    tolerance: float = 1e-10
+    friction: float = 1.0
+    cone: str = "elliptic"
+    impratio: float = 10.0
+    contact_time: float = 2e-3
+    contact_impedance: float = 0.99
+    gravity: float = 9.81
+
+
+class MuJoCoBackend:
+    """One robot on a flat floor."""
+
+    name = "mujoco"
+
+    def __init__(
+        self,
+        robot: Robot,
+        physics: MuJoCoPhysics | None = None,
+        gui: bool = False,
+        servos: Servos | None = None,
+    ) -> None:
+        """Build the world.
+
+        Args:
+            robot: closures are welded; helical joints are refused.
+            physics: see ``MuJoCoPhysics``.
+            gui: show a window.
+            servos: of the joints; rigid by default.
+
+        Raises:
+            MissingDependencyError: mujoco is not installed.
+            InputError: helical joints, a leg with nothing to stand on, or no display for ``gui``.
+        """
+        _check_joints(robot)
+        self._robot = robot
+        self._physics = physics or MuJoCoPhysics()
+        self.dt = self._physics.dt
+        self._servos = servos or RigidServos(robot)
+        self.servo = self._servos.name
+        self._mj = mj = _imported_mujoco()
+        bodies, remarks = bodies_of(robot)
+        self.settings: Mapping[str, Any] = {**asdict(self._physics), "remarks": list(remarks)}
+        spec = _world(mj, self._physics)
+        _add_bodies(mj, spec, robot, bodies, self._servos.rotor_inertia)
+        _add_closures(mj, spec, robot, bodies)
+        self.model = spec.compile()
+        self.data = mj.MjData(self.model)
+        joints = [self.model.joint(name) for name in robot.joint_names]
+        self._qpos = np.array([joint.qposadr[0] for joint in joints], dtype=int)
+        self._dof = np.array([joint.dofadr[0] for joint in joints], dtype=int)
+        self._base = self.model.body(robot.base_link).id
+        frames = {body.link.name: body for body in bodies}
+        self._feet = [
+            (self.model.body(limb.link).id, frames[limb.link].pose(limb.frame))
+            for limb in robot.limbs
+            if limb.kind == "leg"
+        ]
+        self._steps = 0
+        self._torque = self._motor = np.zeros(len(joints))
+        self._contacts: tuple[Contact, ...] = ()
+        self._ankles = np.zeros((len(self._feet), 6))
+        self._window = _opened_window(self.model, self.data) if gui else None
+        self._began = time.monotonic()
+
+    def reset(self, state: State) -> Observation:
+        """Place the robot at rest in a state, and time at 0."""
+        mj, T, q = self._mj, np.asarray(state.T_world_base, dtype=float), np.asarray(state.q, dtype=float)
+        mj.mj_resetData(self.model, self.data)
+        quat = np.zeros(4)
+        mj.mju_mat2Quat(quat, T[:3, :3].ravel())
+        if self._robot.base == "fixed":
+            self.model.body_pos[self._base], self.model.body_quat[self._base] = T[:3, 3], quat
+        else:
+            self.data.qpos[:3], self.data.qpos[3:7] = T[:3, 3], quat
+        self.data.qpos[self._qpos] = q
+        self._servos.reset(q)
+        mj.mj_kinematics(self.model, self.data)
+        self._steps, self._began = 0, time.monotonic()
+        self._torque = self._motor = np.zeros_like(q)
+        self._contacts = ()
+        self._ankles = np.zeros((len(self._feet), 6))
+        return self.observe()
+
+    def step(self, command: Command) -> None:
+        """Let one step pass under a command."""
+        mj, model, data = self._mj, self.model, self.data
+        q, qd = data.qpos[self._qpos], data.qvel[self._dof]
+        action = self._servos.actuate(q, qd, self._motor, command, self.dt)
+        model.dof_frictionloss[self._dof] = np.minimum(action.bound, UNLIMITED)
+        mj.mj_step1(model, data)
+        data.qfrc_applied[self._dof] = action.torque
+        wanted, motor = np.zeros((2, model.nv))
+        wanted[self._dof] = (action.rate - qd) / self.dt
+        rows = slice(data.ne, data.ne + data.nf)
+        driven = data.efc_id[rows]
+        data.efc_aref[rows] = wanted[driven]
+        mj.mj_step2(model, data)
+        motor[driven] = data.efc_force[rows]
+        self._motor = motor[self._dof]
+        self._torque = action.torque + self._motor
+        mj.mj_rnePostConstraint(model, data)
+        self._contacts = tuple(self._pressing())
+        self._ankles = np.array([self._ankle_wrench(body) for body, _ in self._feet]).reshape(-1, 6)
+        mj.mj_kinematics(model, data)
+        self._steps += 1
+        if self._window is not None and self._steps % 20 == 0:
+            self._window.sync()
+            time.sleep(max(0.0, self._began + self._steps * self.dt - time.monotonic()))
+
+    def observe(self) -> Observation:
+        """The state after the last step."""
+        data = self.data
+        return Observation(
+            time=self._steps * self.dt,
+            T_world_base=self.pose(self._base),
+            q=data.qpos[self._qpos],
+            qd=data.qvel[self._dof],
+            torque=self._torque,
+            T_world_foot=np.array([self.pose(body) @ T for body, T in self._feet]).reshape(-1, 4, 4),
+            ankle_wrench=self._ankles,
+            contacts=self._contacts,
+        )
+
+    def pose(self, body: int) -> Array:
+        """World pose (4, 4) of a body, which is the table's frame of its link."""
+        T = np.eye(4)
+        T[:3, :3], T[:3, 3] = self.data.xmat[body].reshape(3, 3), self.data.xpos[body]
+        return T
+
+    def _pressing(self) -> Iterator[Contact]:
+        """Points where the floor presses on the robot; the force includes friction."""
+        mj, model, data = self._mj, self.model, self.data
+        wrench = np.zeros(6)
+        for k in range(data.ncon):
+            touch = data.contact[k]
+            mj.mj_contactForce(model, data, k, wrench)
+            if wrench[0] <= 0.0:
+                continue
+            # The frame's rows are the normal, from the first geometry to the second, and two tangents.
+            force = touch.frame.reshape(3, 3).T @ wrench[:3]
+            floor, other = touch.geom
+            body = model.geom_bodyid[other if model.geom_bodyid[floor] == 0 else floor]
+            force = force if model.geom_bodyid[floor] == 0 else -force
+            yield Contact(model.body(body).name, tuple(touch.pos.tolist()), tuple(force.tolist()))
+
+    def _ankle_wrench(self, body: int) -> Array:
+        """Ground wrench [m; f] about the world origin, from the force in the joint above a foot at rest.
+
+        MuJoCo's force of the parent on the body is about the CoM of the whole robot. The floor supplies what
+        is needed beside that and the foot's weight.
+        """
+        data, model = self.data, self.model
+        moment, force = data.cfrc_int[body, :3], data.cfrc_int[body, 3:]
+        about = data.subtree_com[model.body_rootid[body]]
+        weight = np.array([0.0, 0.0, -model.body_mass[body] * self._physics.gravity])
+        f = -force - weight
+        m = -moment - moment_about_origin(about, force) - moment_about_origin(data.xipos[body], weight)
+        return np.concatenate([m, f])
+
+    def close(self) -> None:
+        """Close the window; closing twice is harmless."""
+        if self._window is not None:
+            self._window.close()
+            self._window = None
+
+
+def _world(mj: Any, physics: MuJoCoPhysics) -> Any:
+    """A floor, gravity and the solver's settings."""
+    spec = mj.MjSpec()
+    spec.compiler.degree = False
+    spec.option.timestep = physics.dt
+    spec.option.gravity = [0.0, 0.0, -physics.gravity]
+    spec.option.integrator = mj.mjtIntegrator.mjINT_EULER
+    spec.option.solver = mj.mjtSolver.mjSOL_NEWTON
+    spec.option.iterations = physics.iterations
+    spec.option.tolerance = physics.tolerance
+    spec.option.cone = getattr(mj.mjtCone, f"mjCONE_{physics.cone.upper()}")
+    spec.option.impratio = physics.impratio
+    # The larger coefficient of the two bodies counts: the floor takes the wanted friction, the robot none.
+    spec.worldbody.add_geom(
+        name="floor",
+        type=mj.mjtGeom.mjGEOM_PLANE,
+        size=[0.0, 0.0, 1.0],
+        contype=1,
+        conaffinity=0,
+        friction=[physics.friction, 0.0, 0.0],
+        solref=[physics.contact_time, 1.0],
+        solimp=[physics.contact_impedance, physics.contact_impedance, 1e-3, 0.5, 2.0],
+        priority=1,
+    )
+    return spec
+
+
+def _add_bodies(mj: Any, spec: Any, robot: Robot, bodies: tuple[Body, ...], rotors: Array) -> None:
+    """All links with their joints, inertias and boxes."""
+    rotor = dict(zip(robot.joint_names, rotors.tolist(), strict=True))
+    made: dict[str | None, tuple[Any, Array]] = {None: (spec.worldbody, np.eye(4))}
+    for body in bodies:
+        parent, to_parent = made[body.parent]
+        pose = to_parent @ body.frame
+        element = parent.add_body(name=body.link.name, pos=pose[:3, 3], quat=_quat(mj, pose))
+        if body.parent is not None or robot.base == "floating":
+            i = body.inertia
+            element.explicitinertial, element.mass = True, float(body.link.mass)
+            element.ipos = body.point(body.link.com)
+            element.fullinertia = [i[0, 0], i[1, 1], i[2, 2], i[0, 1], i[0, 2], i[1, 2]]
+        if body.parent is None and robot.base == "floating":
+            element.add_freejoint(name="floating base")
+        for joint in body.joints:
+            _add_joint(mj, element, body, joint, rotor[joint.name])
+        for size, center in [(as_array(box.size), body.point(box.center)) for box in body.link.boxes]:
+            element.add_geom(
+                type=mj.mjtGeom.mjGEOM_BOX,
+                size=size / 2,
+                pos=center,
+                quat=_quat(mj, body.to_frame),
+                **_ROBOT_GEOM,
+            )
+        for corner in _bare_corners(robot, body):
+            element.add_geom(type=mj.mjtGeom.mjGEOM_SPHERE, size=[CORNER, 0, 0], pos=corner, **_ROBOT_GEOM)
+        made[body.link.name] = (element, body.to_frame)
+
+
+_ROBOT_GEOM = {"contype": 0, "conaffinity": 1, "friction": [0.0, 0.0, 0.0], "mass": 0.0}
+
+
+def _add_joint(mj: Any, element: Any, body: Body, joint: Joint, rotor: float) -> None:
+    kinds = {"revolute": mj.mjtJoint.mjJNT_HINGE, "prismatic": mj.mjtJoint.mjJNT_SLIDE}
+    limits = np.clip([joint.lower, joint.upper], -UNLIMITED, UNLIMITED)
+    element.add_joint(
+        name=joint.name,
+        type=kinds[joint.type],
+        pos=body.point(joint.screw.s0),
+        axis=body.direction(joint.screw.s),
+        limited=bool(np.isfinite([joint.lower, joint.upper]).any()),
+        range=limits,
+        armature=rotor,
+        solimp_friction=[STIFFEST, STIFFEST, 1e-3, 0.5, 2.0],
+    )
+
+
+def _bare_corners(robot: Robot, body: Body) -> list[Array]:
+    """Centres of spheres for the corners of a link's sole that are no corners of one of its boxes."""
+    limbs = [limb.name for limb in robot.limbs if limb.link == body.link.name]
+    soles = [sole for sole in robot.soles if sole.limb in limbs]
+    signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) / 2
+    corners = [as_array(box.center) + signs * as_array(box.size) for box in body.link.boxes]
+    known = np.concatenate([np.zeros((0, 3)), *corners])
+    bare = []
+    for sole in soles:
+        points = np.array([as_array(corner) for corner in sole.corners], dtype=float)
+        missing = [p for p in points if not (np.abs(known - p).max(axis=1, initial=0.0) < CORNER).any()]
+        up = np.cross(points[1] - points[0], points[2] - points[1])
+        up = up / np.linalg.norm(up)
+        bare += [body.to_frame[:3, :3] @ (p + CORNER * up) + body.to_frame[:3, 3] for p in missing]
+    return bare
+
+
+def _add_closures(mj: Any, spec: Any, robot: Robot, bodies: tuple[Body, ...]) -> None:
+    """Two frames on two links that are welded, for every loop of the table."""
+    frames = {body.link.name: body for body in bodies}
+    for closure in robot.closures:
+        ends = ((closure.link_a, closure.frame_a), (closure.link_b, closure.frame_b))
+        names = []
+        for side, (link, frame) in zip("ab", ends, strict=True):
+            T = frames[link].pose(frame)
+            name = f"{closure.name} {side}"
+            spec.body(link).add_site(name=name, pos=T[:3, 3], quat=_quat(mj, T))
+            names.append(name)
+        spec.add_equality(
+            name=closure.name,
+            type=mj.mjtEq.mjEQ_WELD,
+            objtype=mj.mjtObj.mjOBJ_SITE,
+            name1=names[0],
+            name2=names[1],
+            solref=[2e-3, 1.0],
+            solimp=[STIFFEST, STIFFEST, 1e-3, 0.5, 2.0],
+        )
+
+
+def _quat(mj: Any, T: Array) -> Array:
+    """Quaternion wxyz (4,) of a pose."""
+    quat = np.zeros(4)
+    mj.mju_mat2Quat(quat, np.ascontiguousarray(T[:3, :3]).ravel())
+    return quat
+
+
+def _check_joints(robot: Robot) -> None:
+    helical = [joint.name for joint in robot.joints if joint.type == "helical"]
+    if helical:
+        raise InputError(f"robot {robot.name}: MuJoCo has no helical joints, but it has {', '.join(helical)}")
+    soles = {sole.limb for sole in robot.soles}
+    bare = [
+        limb
+        for limb in robot.limbs
+        if limb.kind == "leg" and not robot.link(limb.link).boxes and limb.name not in soles
+    ]
+    if bare:
+        names = ", ".join(f"link {limb.link} of limb {limb.name}" for limb in bare)
+        raise InputError(
+            f"robot {robot.name}: {names} has neither box nor sole, so it would sink into the floor. "
+            "Give the limb a [[sole]], or the link a box whose bottom is the sole."
+        )
+
+
+def _imported_mujoco() -> Any:
+    try:
+        import mujoco
+    except ImportError:
+        raise MissingDependencyError(
+            "this simulation needs mujoco, which is not installed: python -m pip install mujoco"
+        ) from None
+    return mujoco
+
+
+def _opened_window(model: Any, data: Any) -> Any:
+    # Without a display the window's library ends the whole process, so this is asked first.
+    if sys.platform.startswith("linux") and not (
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    ):
+        raise InputError("--gui needs a display, and DISPLAY is not set; leave --gui away")
+    from mujoco.viewer import launch_passive
+
+    return launch_passive(model, data)
