@@ -36,7 +36,7 @@ class Criteria:
     end_error_share: float = 0.05
     slip: float = 0.010
     torque_share: float = 0.999
-    frame_deviation: float = 0.010
+    frame_deviation: float = 0.005
     schedule: Schedule = field(default_factory=Schedule)
 
 
