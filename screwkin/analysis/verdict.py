@@ -52,11 +52,8 @@ class Measured:
     undecided: the verdict lies within a solver's own scatter; it has not passed.
     robot_sha256: of the table that was simulated. compensation: how the commands allow for elastic servos, or
     ``none``; servo: what moved the joints; joint_stiffness [N m/rad] and sole_stiffness [N/m]: of the
-    simulated springs, None if rigid; repeated: runs under other conditions.
-    engine: names of all engines, joined by ``+``; numbers are the worst of them. By the engine's name:
-    engine_settings; engines: what each measured; solver: what finer settings change, None if not tried.
-    undecided: the verdict lies within a solver's own scatter; it has not passed. self_collisions: along plan
-    and simulation, beyond what ``home`` has; None where none were looked for.
+    simulated springs, None if rigid; repeated: runs under other conditions. self_collisions: along plan and
+    simulation, beyond what ``home`` has; None where none were looked for.
     """
 
     passed: bool
@@ -94,9 +91,6 @@ class Measured:
     joint_stiffness: dict[str, float] | None
     sole_stiffness: float | None
     repeated: dict[str, Any] | None
-    engines: dict[str, dict[str, Any]]
-    solver: dict[str, dict[str, Any]] | None
-    undecided: bool
     self_collisions: tuple[SelfCollision, ...] | None
 
     def to_dict(self) -> dict[str, Any]:
