@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
+import re
 import secrets
 import tempfile
 import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, BinaryIO, TextIO
 
@@ -20,6 +23,10 @@ from numpy.typing import NDArray
 from screwkin.errors import InputError, OutputError, ScrewkinError
 
 _DATE = (1980, 1, 1, 0, 0, 0)  # the earliest a zip can tell; a true one would change the bytes
+LARGEST = 2**28
+"""Bytes that a file may unpack to; an hour of walking at 50 Hz takes about as many."""
+DEEPEST = 64
+"""Levels to which the JSON of a file may be nested; a walk's own data have seven."""
 _DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, KeyError, tokenize.TokenError)
 
 
@@ -104,13 +111,22 @@ def read_npz(data: bytes) -> dict[str, NDArray[Any]]:
     """The arrays of an npz file; pickled objects are refused.
 
     Raises:
-        InputError: not an npz file, truncated, damaged, or holding pickles.
+        InputError: not an npz file, truncated, damaged, too large when unpacked, or holding pickles.
     """
     if not (data.startswith(b"PK") and zipfile.is_zipfile(io.BytesIO(data))):
         raise InputError("not an npz file, or a truncated one; make it again")
     try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            unpacked = sum(member.file_size for member in archive.infolist())
+        if unpacked > LARGEST:
+            raise InputError(
+                f"it unpacks to {unpacked / 1e6:.0f} MB, more than the {LARGEST / 1e6:.0f} MB that are read; "
+                "split the motion, or take fewer samples per second"
+            )
         with np.load(io.BytesIO(data), allow_pickle=False) as archive:
             arrays = {name: archive[name] for name in archive.files}
+    except InputError:
+        raise
     except (ValueError, SyntaxError) as error:
         pickled = "allow_pickle" in str(error)
         found = "it holds pickled objects, which are never read" if pickled else f"damaged: {error}"
@@ -121,6 +137,51 @@ def read_npz(data: bytes) -> dict[str, NDArray[Any]]:
     if foreign:
         raise InputError(f"it holds files that are no arrays: {', '.join(foreign)}")
     return arrays
+
+
+def read_file(path: str | Path) -> bytes:
+    """All bytes of a file.
+
+    Raises:
+        OSError: it cannot be read. InputError: it holds more than ``LARGEST`` bytes.
+    """
+    with Path(path).open("rb") as file:
+        data = file.read(LARGEST + 1)
+    if len(data) > LARGEST:
+        raise InputError(f"more than the {LARGEST / 1e6:.0f} MB that are read; it is no file of screwkin")
+    return data
+
+
+def read_json(text: str) -> Any:
+    """The JSON data of a text that came from a file.
+
+    Raises:
+        InputError: no JSON, or nested deeper than ``DEEPEST``.
+    """
+    depth = deepest = 0
+    for bracket in re.findall(r'"(?:[^"\\]|\\.)*"|[\[\]{}]', text, re.DOTALL):
+        depth += (bracket in "[{") - (bracket in "]}")
+        deepest = max(deepest, depth)
+    if deepest > DEEPEST:
+        raise InputError(f"JSON nested {deepest:,} deep, at most {DEEPEST} are read")
+    try:
+        return json.loads(text)
+    except ValueError as error:
+        raise InputError(f"no JSON: {error}") from None
+
+
+def versions(*names: str) -> dict[str, str]:
+    """Installed version of every distribution, by its name; ``unknown`` where there is none."""
+    found = dict.fromkeys(names, "unknown")
+    for name in names:
+        with suppress(PackageNotFoundError):
+            found[name] = version(name)
+    return found
+
+
+def text_sha256(text: str) -> str:
+    """SHA-256 of a text in UTF-8, in hexadecimal."""
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def csv_text(time: NDArray[np.float64], joint_names: Sequence[str], q: NDArray[np.float64]) -> str:

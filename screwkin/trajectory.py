@@ -22,12 +22,23 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.hermite import hermite, places
 from screwkin.algebra.se3 import as_array, rotation_exp, rotation_from_array, rotation_log
 from screwkin.errors import InputError, TrajectoryError, expect
-from screwkin.files import atomic_write, atomic_write_bytes, csv_text, npz_bytes, read_npz, ros_text
+from screwkin.files import (
+    atomic_write,
+    atomic_write_bytes,
+    csv_text,
+    npz_bytes,
+    read_file,
+    read_json,
+    read_npz,
+    ros_text,
+)
 from screwkin.kinematics.rigid import foreign
 from screwkin.model.display import html_table, listing
 from screwkin.model.robot import Robot
 
 TIP_PREFIX = "T_world_"
+LONGEST = 3600.0
+"""Duration of a trajectory [s]; a simulation holds every step of it in memory."""
 _SHAPES: Mapping[str, tuple[str, ...]] = {
     "time": ("T",),
     "q": ("T", "n"),
@@ -220,11 +231,10 @@ def load_trajectory(path: str | Path) -> Trajectory:
     if path.suffix in (".csv", ".json"):
         raise TrajectoryError(f"{path}: a {path.suffix} file holds the joints only; give the .npz beside it")
     try:
-        data = path.read_bytes()
+        data = read_file(path)
+        trajectory = _from_arrays(read_npz(data))
     except OSError as error:
         raise TrajectoryError(f"{path}: cannot be read: {error.strerror}") from None
-    try:
-        trajectory = _from_arrays(read_npz(data))
     except InputError as error:
         raise TrajectoryError(f"{path}: {error}") from None
     object.__setattr__(trajectory, "_file_sha256", hashlib.sha256(data).hexdigest())
@@ -267,9 +277,11 @@ def sha256_of(path: str | Path) -> str:
         TrajectoryError: it cannot be read.
     """
     try:
-        return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+        return hashlib.sha256(read_file(path)).hexdigest()
     except OSError as error:
         raise TrajectoryError(f"{path}: cannot be read: {error.strerror}") from None
+    except InputError as error:
+        raise TrajectoryError(f"{path}: {error}") from None
 
 
 def _numbers(name: str, value: Any, shape: tuple[int, ...], faults: list[str]) -> Array:
@@ -311,8 +323,8 @@ def _names(name: str, value: Any, faults: list[str]) -> tuple[str, ...]:
 
 def _json_data(meta: Any, faults: list[str]) -> Mapping[str, Any]:
     try:
-        data = json.loads(json.dumps(dict(meta), allow_nan=False))
-    except (TypeError, ValueError) as error:
+        data = read_json(json.dumps(dict(meta), allow_nan=False))
+    except (TypeError, ValueError, RecursionError) as error:
         faults.append(f"meta is not JSON data: {error}")
         data = {}
     return MappingProxyType(data)
@@ -326,6 +338,11 @@ def _inconsistencies(trajectory: Trajectory) -> list[str]:
     elif np.min(np.diff(trajectory.time)) <= 0:
         row = int(np.argmax(np.diff(trajectory.time) <= 0)) + 1
         faults.append(f"time does not increase at sample {row} ({trajectory.time[row]:g} s)")
+    if trajectory.samples and trajectory.duration > LONGEST:
+        faults.append(
+            f"time goes from {trajectory.time[0]:g} to {trajectory.time[-1]:g} s; at most {LONGEST:g} s are "
+            "one motion, so play it in parts"
+        )
     unknown = [foot for foot in trajectory.feet if foot not in trajectory.T_world_tip]
     if unknown:
         faults.append(f"feet names {', '.join(unknown)}, without {TIP_PREFIX}{unknown[0]}")
@@ -370,9 +387,9 @@ def _from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Trajectory:
     rest: dict[str, Any] = {name: arrays[name] for name in names}
     meta = rest["meta"]
     try:
-        rest["meta"] = json.loads(str(meta)) if meta.dtype.kind == "U" and meta.ndim == 0 else None
-    except ValueError:
-        rest["meta"] = None
+        rest["meta"] = read_json(str(meta)) if meta.dtype.kind == "U" and meta.ndim == 0 else None
+    except InputError as error:
+        raise TrajectoryError(f"meta is not the text of a JSON object: {error}") from None
     if not isinstance(rest["meta"], dict):
         raise TrajectoryError("meta is not the text of a JSON object")
     return Trajectory(T_world_tip=tips, **rest)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,6 +11,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, pose_from_array, unstack
 from screwkin.errors import TableError, TrajectoryError
+from screwkin.files import text_sha256
 from screwkin.gait.balance import Balance, zmp
 from screwkin.gait.intended import intended
 from screwkin.kinematics.positions import link_displacements, pose_in_base
@@ -46,14 +46,7 @@ class Account:
     @cached_property
     def closure(self) -> Mapping[str, tuple[float, float]]:
         """For every tip: largest distance [m] and angle [rad] from where the joints carry it."""
-        T = pose_from_array(self.trajectory.T_world_base)
-        D = link_displacements(self.robot, unstack(self.motion.q))
-        errors = {}
-        for tip, recorded in self.trajectory.T_world_tip.items():
-            reached = as_array(T @ pose_in_base(self.robot, D, tip), (self.trajectory.samples,))
-            gap = float(np.linalg.norm(reached[:, :3, 3] - recorded[:, :3, 3], axis=1).max())
-            errors[tip] = (gap, float(_angle(reached[:, :3, :3], recorded[:, :3, :3]).max()))
-        return errors
+        return closure_of(self.robot, self.trajectory, self.motion)
 
     @property
     def max_closure(self) -> float:
@@ -138,7 +131,7 @@ def account_of(robot: Robot, trajectory: Trajectory) -> Account:
         InputError: joints or tips are not the robot's, or a foot has no sole. TrajectoryError: rates or
             accelerations so large that no forces can be computed.
     """
-    _check_tips(robot, trajectory)
+    check_tips(robot, trajectory)
     with np.errstate(over="ignore", invalid="ignore"):
         motion = intended(robot, trajectory)
         balance = zmp(robot, motion)
@@ -165,7 +158,7 @@ def recorded_robot(trajectory: Trajectory, path: str = "the trajectory") -> Robo
     text = recorded.get("table") if isinstance(recorded, dict) else None
     if not isinstance(recorded, dict) or not isinstance(text, str):
         raise TrajectoryError(f"{path}: meta holds no robot table; make it again with: screwkin walk")
-    if hashlib.sha256(text.encode()).hexdigest() != recorded.get("sha256"):
+    if text_sha256(text) != recorded.get("sha256"):
         raise TrajectoryError(
             f"{path}: the robot table in meta is not the one whose SHA-256 stands beside it; it was changed "
             "after the trajectory was made. Make it again with: screwkin walk"
@@ -176,7 +169,24 @@ def recorded_robot(trajectory: Trajectory, path: str = "the trajectory") -> Robo
         raise TrajectoryError(f"{path}: its robot table is not readable by this version: {error}") from None
 
 
-def _check_tips(robot: Robot, trajectory: Trajectory) -> None:
+def closure_of(robot: Robot, trajectory: Trajectory, motion: Trajectory) -> dict[str, tuple[float, float]]:
+    """For every tip: largest distance [m] and angle [rad] from where the joints of a motion carry it."""
+    T = pose_from_array(trajectory.T_world_base)
+    D = link_displacements(robot, unstack(motion.q))
+    errors = {}
+    for tip, recorded in trajectory.T_world_tip.items():
+        reached = as_array(T @ pose_in_base(robot, D, tip), (trajectory.samples,))
+        gap = float(np.linalg.norm(reached[:, :3, 3] - recorded[:, :3, 3], axis=1).max())
+        errors[tip] = (gap, float(_angle(reached[:, :3, :3], recorded[:, :3, :3]).max()))
+    return errors
+
+
+def check_tips(robot: Robot, trajectory: Trajectory) -> None:
+    """Refuse a trajectory that names no feet, or tips that the robot has not.
+
+    Raises:
+        TrajectoryError: names them.
+    """
     if not trajectory.feet:
         raise TrajectoryError("the trajectory names no feet; a ZMP needs soles on the floor")
     strange = [tip for tip in trajectory.T_world_tip if tip not in robot.tip_names]

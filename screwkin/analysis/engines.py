@@ -19,6 +19,8 @@ from screwkin.trajectory import Trajectory
 
 Engine = Literal["auto", "pybullet", "mujoco", "kinematic"]
 ENGINES: tuple[Engine, ...] = ("auto", "pybullet", "mujoco", "kinematic")
+PROVING: tuple[Engine, ...] = ("mujoco", "pybullet")
+"""Engines whose contact forces confirm a walk; ``+`` joins the names of two runs."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,11 @@ class SimulatedCompliance:
         k = joint_stiffness(robot, stiffness_of(trajectory) if chosen is None else chosen).tolist()
         by_name = dict(zip(robot.joint_names, k, strict=True))
         return replace(self, servos=replace(self.servos, stiffness=by_name))
+
+
+def confirms(engine: str) -> bool:
+    """Whether runs of that name simulate contact forces, all of them."""
+    return all(name in PROVING for name in engine.split("+"))
 
 
 def engines_for(engine: Engine, robot: Robot, compliance: SimulatedCompliance) -> tuple[Engine, ...]:

@@ -1,11 +1,13 @@
-"""May a trajectory be sent to the servos? Every reason against it is one that could break the robot."""
+"""May a trajectory be sent to the servos? Every reason against it is one that could break the robot.
+
+Nothing is believed that can be computed: hashes, rates, margins, limits and the very frames are computed anew
+where they are used. What only a simulator knows (that the robot did not fall) rests on the verdict's word.
+"""
 
 from __future__ import annotations
 
-import hashlib
-import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,50 +15,124 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.errors import InputError, SafetyError, UnknownNameError
+from screwkin.analysis.consistency import motion_faults
+from screwkin.analysis.frame_deviation import frame_deviation
+from screwkin.analysis.validate import planned_facts
+from screwkin.analysis.verdict import Criteria, Verdict, bound_to, contradictions, verdict_from_json
+from screwkin.errors import InputError, SafetyError, ScrewkinError, TrajectoryError, UnknownNameError
+from screwkin.files import read_file, text_sha256
 from screwkin.model.records import LIMIT_TOLERANCE
-from screwkin.model.robot import Robot
+from screwkin.model.robot import Robot, robot_text
 from screwkin.model.table import load_robot
+from screwkin.servo.gate import Bounds
+from screwkin.servo.player import Frames, PlaySettings, frames_of
+from screwkin.servo.servo_map import ServoMap
 from screwkin.trajectory import Trajectory, check_joints, load_trajectory, sha256_of
 
 VERDICT = "validation.json"
+_SAME = 1e-6  # of numbers computed anew: what other versions' rounding may change
 
 
 @dataclass(frozen=True, eq=False)
 class Ready:
-    """A trajectory that may be sent, the robot that it was planned for, and the verdict that let it pass."""
+    """A trajectory that may be sent, its robot, the verdict that let it pass, and what will be sent.
+
+    deviation: of the frames from the validated path, see ``frame_deviation`` [m].
+    """
 
     trajectory: Trajectory
     robot: Robot
-    verdict: dict[str, Any]
+    verdict: Verdict
+    servos: ServoMap
+    bounds: Bounds
+    frames: Frames
+    deviation: float
 
 
-def ready(path: str | Path, robot: str | Path | None = None) -> Ready:
+def ready(path: str | Path, robot: str | Path | None = None, settings: PlaySettings | None = None) -> Ready:
     """The trajectory of a file, if it passed validation as it is and keeps to the robot's limits.
 
     Args:
         path: ``.npz`` with its ``validation.json`` beside it.
-        robot: name or table of the robot at hand; by default the bundled one that the trajectory
-            names.
+        robot: name or table of the robot at hand; by default the table file that the trajectory was planned
+            with, or the bundled one.
+        settings: how it will be played.
 
     Raises:
         SafetyError: never validated, validation failed or was of another file, the file or the robot's table
-            was changed since, or positions, speeds or torques are beyond the limits.
+            was changed since, the verdict or the trajectory contradicts itself, positions, speeds or torques
+            are beyond the limits, or frames at that rate are not the validated path.
         TrajectoryError: no such file, or not one that can be read. TableError: the robot's table is wrong.
+        InputError: no such rate.
     """
     path = Path(path)
     if path.suffix in (".csv", ".json"):
         load_trajectory(path)  # says which file is expected instead
     sha256 = sha256_of(path)
     verdict = _passed(path, sha256)
-    trajectory = load_trajectory(path)
+    try:
+        trajectory = load_trajectory(path)
+    except TrajectoryError as error:
+        raise SafetyError(f"no trajectory that was ever validated: {error}") from error
     if trajectory.sha256 != sha256:
         raise SafetyError(f"{path} changed while it was read; plan it again and validate it")
     known = _same_robot(path, trajectory, robot)
-    reasons = [*limit_faults(known, trajectory), *_torque_faults(verdict)]
-    if reasons:
-        raise SafetyError(f"{path}: beyond the limits of {known.name}: " + "; ".join(reasons))
-    return Ready(trajectory, known, verdict)
+    _refuse(path, f"is beyond the limits of {known.name}", limit_faults(known, trajectory))
+    _refuse(path, "is not what was validated", _verdict_faults(known, trajectory, verdict))
+    _refuse(path, "contradicts itself", _motion_faults(known, trajectory))
+    how = settings or PlaySettings()
+    servos = ServoMap.of(known)
+    bounds = Bounds.of(known, servos, how.torque)
+    frames = frames_of(bounds, trajectory, how.rate)
+    away, allowed = frame_deviation(known, trajectory, bounds, frames), Criteria().frame_deviation
+    if not away <= min(allowed, verdict.criteria.frame_deviation):
+        raise SafetyError(
+            f"{path}: at {how.rate:g} frames per second a limb is up to {1e3 * away:.1f} mm from the "
+            f"validated path, allowed {1e3 * allowed:.1f} mm; raise --rate, or plan a slower walk"
+        )
+    return Ready(trajectory, known, verdict, servos, bounds, frames, away)
+
+
+def _refuse(path: Path, what: str, faults: list[str]) -> None:
+    if faults:
+        raise SafetyError(f"{path} {what}: " + "; ".join(faults))
+
+
+def _verdict_faults(robot: Robot, trajectory: Trajectory, verdict: Verdict) -> list[str]:
+    """Fields of a verdict that are not those of robot and trajectory as they stand now."""
+    try:
+        with np.errstate(all="ignore"):  # what is not finite is not the same
+            anew = planned_facts(robot, trajectory) | bound_to(robot, trajectory)
+    except ScrewkinError as error:
+        return [str(error)]
+    faults = [
+        f"{name} is {_short(value)}, the verdict says {_short(getattr(verdict, name))}"
+        for name, value in anew.items()
+        if not _same(value, getattr(verdict, name))
+    ]
+    if set(verdict.torque_use) != set(robot.joint_names):
+        faults.append(f"torque_use is not of the joints of {robot.name}")
+    return faults
+
+
+def _same(a: Any, b: Any) -> bool:
+    if isinstance(a, Mapping) and isinstance(b, Mapping):
+        return a.keys() == b.keys() and all(_same(a[key], b[key]) for key in a)
+    if isinstance(a, float) and isinstance(b, int | float):
+        return math.isclose(a, b, rel_tol=_SAME, abs_tol=_SAME)
+    return bool(a == b)
+
+
+def _short(value: Any) -> str:
+    text = f"{value:.6g}" if isinstance(value, float) else str(value)
+    return text if len(text) <= 24 else f"{text[:12]}…"
+
+
+def _motion_faults(robot: Robot, trajectory: Trajectory) -> list[str]:
+    try:
+        return list(motion_faults(robot, trajectory))
+    except (ScrewkinError, KeyError, TypeError) as error:  # meta may hold anything
+        return [str(error)]
 
 
 def limit_faults(robot: Robot, trajectory: Trajectory) -> list[str]:
@@ -88,35 +164,28 @@ def _speed_faults(name: str, limit: float, time: Array, rate: Array, steps: Arra
             return
 
 
-def _torque_faults(verdict: dict[str, Any]) -> Iterator[str]:
-    """Joints that needed more than their servo's torque in the simulation."""
-    use = verdict.get("torque_use")
-    for name, share in use.items() if isinstance(use, dict) else ():
-        if not isinstance(share, int | float) or not math.isfinite(share) or share > 1.0 + 1e-6:
-            yield f"{name} needed {share!r} of its servo's torque in the simulation"
-
-
-def _passed(path: Path, sha256: str) -> dict[str, Any]:
-    """The verdict beside a trajectory; it passed, and it is about these bytes."""
+def _passed(path: Path, sha256: str) -> Verdict:
+    """The verdict beside a trajectory; it passed, by its own numbers too, and it is about these bytes."""
     beside = path.parent / VERDICT
     do = f"Run: screwkin validate {path}"
     try:
-        verdict = json.loads(beside.read_text(encoding="utf-8"))
+        verdict = verdict_from_json(read_file(beside).decode())
     except FileNotFoundError:
         raise SafetyError(f"{path} was never validated: there is no {beside}. {do}") from None
-    except (OSError, ValueError, RecursionError) as error:
+    except (OSError, UnicodeError) as error:
         raise SafetyError(f"{beside} cannot be read ({error}). {do}") from None
-    if not isinstance(verdict, dict) or "passed" not in verdict or "trajectory_sha256" not in verdict:
-        raise SafetyError(f"{beside} is no verdict: passed or trajectory_sha256 is missing. {do}")
-    if verdict["trajectory_sha256"] != sha256:
+    except InputError as error:
+        raise SafetyError(f"{beside} is no verdict of this version: {error}. {do}") from None
+    if verdict.trajectory_sha256 != sha256:
         raise SafetyError(
             f"{beside} is about another trajectory, or {path.name} was changed after it was validated: its "
-            f"SHA-256 is {sha256[:12]}…, the verdict's {str(verdict['trajectory_sha256'])[:12]}…. {do}"
+            f"SHA-256 is {sha256[:12]}…, the verdict's {verdict.trajectory_sha256[:12]}…. {do}"
         )
-    if verdict["passed"] is not True:
-        reasons = verdict.get("reasons")
-        why = "; ".join(map(str, reasons)) if isinstance(reasons, list) and reasons else "no reason recorded"
+    if not verdict.passed:
+        why = "; ".join(verdict.reasons) or "no reason recorded"
         raise SafetyError(f"{path} did not pass validation: {why}. Change the gait, and validate again")
+    if against := contradictions(verdict):
+        raise SafetyError(f"{beside} says passed, but: {'; '.join(against)}. {do}")
     return verdict
 
 
@@ -127,18 +196,20 @@ def _same_robot(path: Path, trajectory: Trajectory, robot: str | Path | None) ->
     table, name = recorded.get("table"), recorded.get("name")
     if not isinstance(table, str) or not isinstance(name, str):
         raise SafetyError(f"{path}: it does not say which robot it is for. Plan it again with: screwkin walk")
+    file = recorded.get("path")
+    source = robot if robot is not None else file if isinstance(file, str) and file else name
     try:
-        now = load_robot(name if robot is None else robot)
+        now = load_robot(source)
     except UnknownNameError as error:
         if robot is not None:
             raise
         raise SafetyError(
-            f"{path} is for the robot {name!r}, whose table is not a bundled one. Name it: --robot FILE.toml"
+            f"{path} is for the robot {name!r}, whose table {source} is not there. Name it: --robot FILE.toml"
         ) from error
-    if now.text != table or recorded.get("sha256") != _sha(table):
+    if robot_text(now) != table or recorded.get("sha256") != text_sha256(table):
         raise SafetyError(
             f"{path} was planned for another table than {now.path}: the table of {now.name!r} changed "
-            f"since (SHA-256 {_sha(table)[:12]}… then, {_sha(now.text)[:12]}… now). "
+            f"since (SHA-256 {text_sha256(table)[:12]}… then, {text_sha256(robot_text(now))[:12]}… now). "
             "Plan it again, or name the table it was planned for: --robot FILE.toml"
         )
     try:
@@ -146,7 +217,3 @@ def _same_robot(path: Path, trajectory: Trajectory, robot: str | Path | None) ->
     except InputError as error:
         raise SafetyError(str(error)) from error
     return now
-
-
-def _sha(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,18 +12,19 @@ from screwkin.algebra.arrays import Array
 from screwkin.analysis.agreement import agreed, settled
 from screwkin.analysis.compliance import Conditions, StudyRow, Trial, repeated, summarised
 from screwkin.analysis.engines import Engine, Refinement, SimulatedCompliance, engines_for, opened
+from screwkin.analysis.verdict import Criteria, Measured, reasons_of
 from screwkin.errors import InputError
+from screwkin.files import text_sha256
 from screwkin.gait.balance import zmp as balance_of
 from screwkin.gait.compensation import way_of
 from screwkin.gait.intended import intended
-from screwkin.model.robot import Robot
+from screwkin.model.robot import Robot, robot_text
 from screwkin.sim.camera import Camera, Picture
-from screwkin.sim.measure import WINDOW, Slip, ZmpRecord, slip, speed_use, torque_use, zmp_record
+from screwkin.sim.measure import Slip, ZmpRecord, slip, speed_use, torque_use, zmp_record
 from screwkin.sim.render import pictures
-from screwkin.sim.run import Run, Schedule, simulate
+from screwkin.sim.run import Run, simulate
 from screwkin.trajectory import Trajectory, check_joints
 
-_SERIES = ("run", "zmp", "pictures")
 _MEASURED = (
     *("passed", "reasons", "fell", "fell_at", "distance", "end_error_mm", "end_turn_deg", "zmp_rms_mm"),
     *("zmp_max_mm", "ankle_rms_xy_mm", "slip_mm", "max_tilt_deg", "min_base_height"),
@@ -35,72 +36,14 @@ _FINER = {
 }
 
 
-@dataclass(frozen=True)
-class Criteria:
-    """When a walk passes: lengths in m; shares of the planned distance and of the servos' torque."""
-
-    end_error: float = 0.010
-    end_error_share: float = 0.05
-    slip: float = 0.010
-    torque_share: float = 0.999
-    schedule: Schedule = field(default_factory=Schedule)
-
-
 @dataclass(frozen=True, eq=False)
-class Validation:
-    """The verdict. ``to_dict`` returns its numbers as JSON data; series and pictures are for reports.
+class Validation(Measured):
+    """The verdict with the run it rests on; series and pictures are for reports."""
 
-    zmp_rms_mm and zmp_max_mm: contact ZMP against the planned one, the larger of x and y; the ``_xy`` fields
-    hold both, and ankle_rms_xy_mm the ankle sensors against the contacts; None where nothing was measured.
-    compensation: how the commands allow for elastic servos, or ``none``; joint_stiffness [N m/rad] and
-    sole_stiffness [N/m]: of the simulated springs, None if rigid; repeated: runs under other conditions.
-    engine: names of all engines, joined by ``+``; numbers are the worst of them. By the engine's name:
-    engine_settings, engines: what each measured, and solver: what finer settings change, None if not tried.
-    undecided: the verdict lies within a solver's own scatter; it has not passed.
-    """
-
-    passed: bool
-    reasons: tuple[str, ...]
-    warnings: tuple[str, ...]
-    engine: str
-    fell: bool
-    fell_at: float | None
-    distance: float
-    planned_distance: float
-    end_error_mm: float
-    end_turn_deg: float
-    zmp_rms_mm: float | None
-    zmp_max_mm: float | None
-    zmp_rms_xy_mm: tuple[float, float] | None
-    zmp_max_xy_mm: tuple[float, float] | None
-    ankle_rms_xy_mm: tuple[float, float] | None
-    min_margin_mm: float
-    slip_mm: float
-    slip_total_mm: float
-    slip_turn_deg: float
-    max_tilt_deg: float
-    min_base_height: float
-    torque_use: dict[str, float]
-    speed_use: dict[str, float]
-    trajectory_sha256: str
-    compensation: str
-    joint_stiffness: dict[str, float] | None
-    sole_stiffness: float | None
-    repeated: StudyRow | None
-    servo: str
-    engine_settings: dict[str, dict[str, Any]]
-    engines: dict[str, dict[str, Any]]
-    solver: dict[str, dict[str, Any]] | None
-    undecided: bool
     run: Run
     zmp: ZmpRecord
+    study: StudyRow | None = None
     pictures: tuple[Picture, ...] = ()
-
-    def to_dict(self) -> dict[str, Any]:
-        """All but the series, as JSON data for ``validation.json``."""
-        values = {f.name: getattr(self, f.name) for f in fields(self) if f.name not in _SERIES}
-        plain = {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
-        return plain | {"repeated": None if self.repeated is None else self.repeated.to_dict()}
 
 
 def validate(
@@ -174,7 +117,7 @@ def validate(
     for name in names:
         usual, *others = [played(name, way) for way in ways.values()]
         finer = dict(zip(list(ways)[1:], others, strict=True))
-        checks.append(settled(usual, finer, lambda check: _reasons(check, rule)) if finer else usual)
+        checks.append(settled(usual, finer, lambda check: reasons_of(check, rule)) if finer else usual)
     check = agreed(checks)
     check = replace(check, pictures=film(robot, trajectory, check.run, camera) if camera else ())
     if not compliance.repeat or compliance.servos is None:
@@ -191,9 +134,9 @@ def validate(
 def _repeated(check: Validation, trials: Sequence[Trial]) -> Validation:
     """The verdict with repeated runs, none of which may fall."""
     (row,) = summarised(trials)
-    fell = f"falls in {row.fallen} of {row.runs} repetitions under other frictions and time steps"
-    reasons = (*check.reasons, *([fell] if row.fallen else []))
-    return replace(check, repeated=row, reasons=reasons, passed=not reasons)
+    check = replace(check, repeated=row.to_dict(), study=row)
+    reasons = (*_unmeasured(check.run), *reasons_of(check, check.criteria))
+    return replace(check, reasons=reasons, passed=not reasons)
 
 
 def film(robot: Robot, trajectory: Trajectory, run: Run, camera: Camera) -> tuple[Picture, ...]:
@@ -233,10 +176,10 @@ def judged(
         reasons=(),
         warnings=_warnings(robot, trajectory, run, slipped, speed),
         engine=run.engine,
+        criteria=criteria,
         fell=run.fallen_at is not None,
         fell_at=run.fallen_at,
         distance=reached,
-        planned_distance=_distance(planned[0], planned[-1]),
         end_error_mm=1e3 * _distance(planned[-1], last),
         end_turn_deg=float(np.rad2deg(_turn(planned[-1], last))),
         zmp_rms_mm=max(rms) if rms else None,
@@ -244,16 +187,13 @@ def judged(
         zmp_rms_xy_mm=rms,
         zmp_max_xy_mm=largest,
         ankle_rms_xy_mm=ankle,
-        min_margin_mm=1e3 * _least_margin(robot, trajectory),
         slip_mm=1e3 * slipped.largest,
         slip_total_mm=1e3 * slipped.total,
         slip_turn_deg=float(np.rad2deg(slipped.turned)),
         max_tilt_deg=float(np.rad2deg(run.tilt.max())),
         min_base_height=float(run.T_world_base[:, 2, 3].min()),
         torque_use=dict(zip(robot.joint_names, torque.tolist(), strict=True)),
-        speed_use=dict(zip(robot.joint_names, speed.tolist(), strict=True)),
-        trajectory_sha256=trajectory.sha256,
-        compensation=way_of(trajectory),
+        **planned_facts(robot, trajectory),
         joint_stiffness=dict(springs) if isinstance(springs, Mapping) else None,
         sole_stiffness=compliance.sole_stiffness,
         repeated=None,
@@ -265,44 +205,50 @@ def judged(
         run=run,
         zmp=zmp,
     )
-    reasons = _reasons(facts, criteria)
+    reasons = (*_unmeasured(run), *reasons_of(facts, criteria))
     check = replace(facts, passed=not reasons, reasons=reasons)
     measured = check.to_dict()
     return replace(check, engines={run.engine: {name: measured[name] for name in _MEASURED}})
 
 
-def _least_margin(robot: Robot, trajectory: Trajectory) -> float:
+def planned_facts(robot: Robot, trajectory: Trajectory) -> dict[str, Any]:
+    """The fields of a verdict that follow from robot and trajectory alone, without a simulator."""
+    T, speed = trajectory.T_world_base, speed_use(trajectory, robot)
+    return {
+        "planned_distance": _distance(T[0], T[-1]),
+        "min_margin_mm": 1e3 * least_margin(robot, trajectory),
+        "speed_use": dict(zip(robot.joint_names, speed.tolist(), strict=True)),
+        "trajectory_sha256": trajectory.sha256,
+        "robot_sha256": text_sha256(robot_text(robot)),
+        "compensation": way_of(trajectory),
+    }
+
+
+def least_margin(robot: Robot, trajectory: Trajectory) -> float:
     """The smallest margin [m], recorded or computed anew: a verdict does not rest on what a file says."""
     anew = balance_of(robot, intended(robot, trajectory))
-    return float(min(trajectory.margin.min(), anew.margin.min()))
+    return float(np.min([trajectory.margin.min(), anew.margin.min()]))
 
 
-def _reasons(facts: Validation, rule: Criteria) -> tuple[str, ...]:
-    """Every criterion that failed, with its number and its bound."""
-    reasons = []
-    if facts.engine == "kinematic":
-        reasons.append("engine kinematic simulates no forces and confirms nothing; use mujoco")
-    if facts.fell_at is not None:
-        reasons.append(
-            f"fell at {facts.fell_at:.2f} s: tilt {facts.max_tilt_deg:.0f} deg (limit "
-            f"{np.rad2deg(rule.schedule.fallen_tilt):.0f}), base down to {facts.min_base_height:.3f} m"
-        )
-    allowed = 1e3 * max(rule.end_error, rule.end_error_share * facts.planned_distance)
-    if facts.end_error_mm > allowed:
-        reasons.append(f"end error {facts.end_error_mm:.1f} mm, allowed {allowed:.1f} mm")
-    if facts.slip_mm > 1e3 * rule.slip:
-        reasons.append(f"a stance foot slips {facts.slip_mm:.1f} mm, allowed {1e3 * rule.slip:.1f} mm")
-    if facts.min_margin_mm < 0.0:
-        reasons.append(f"planned ZMP leaves the support polygon by {-facts.min_margin_mm:.1f} mm")
-    tired = [f"{name} {100 * use:.0f} %" for name, use in facts.torque_use.items() if use > rule.torque_share]
-    if tired:
-        reasons.append(f"torque at the servo's limit for {1e3 * WINDOW:.0f} ms: {', '.join(tired)}")
-    return tuple(reasons)
+def _unmeasured(run: Run) -> Iterator[str]:
+    """Series of a run that hold no number where one was to be measured."""
+    names = ("T_world_base", "q", "qd", "torque", "T_world_foot", "ground_wrench", "foot_force")
+    for name in names:
+        rows = np.asarray(getattr(run, name)).reshape(len(run.time), -1)
+        bad = ~np.isfinite(rows).all(axis=1)
+        if bad.any():
+            yield f"the simulation gave no number for {name} at {run.time[int(bad.argmax())]:.2f} s"
 
 
 def _warnings(robot: Robot, trajectory: Trajectory, run: Run, slipped: Slip, speed: Array) -> tuple[str, ...]:
     """What does not fail a walk but should be known."""
     warnings = []
+    recorded = trajectory.meta.get("robot")
+    if isinstance(recorded, Mapping) and recorded.get("table") != robot_text(robot):
+        warnings.append(
+            f"judged with another table of {robot.name} than the one that the trajectory records; it cannot "
+            "be sent with this verdict"
+        )
     if way_of(trajectory) != "none" and run.servo == "rigid":
         warnings.append("commands that allow for elastic servos, simulated on rigid ones")
     fast = [

@@ -10,7 +10,8 @@ import numpy as np
 
 from screwkin.analysis.account import account_of, recorded_robot
 from screwkin.analysis.replay import replayed
-from screwkin.analysis.validate import Criteria, Validation
+from screwkin.analysis.validate import Validation
+from screwkin.analysis.verdict import Criteria
 from screwkin.cli.folder import output_folder
 from screwkin.cli.output import aligned, print_json, remark
 from screwkin.cli.simulation import Wish, print_verdict, simulate_to_files

@@ -21,7 +21,7 @@ from screwkin.model.robot import Robot
 from screwkin.servo.budget import ADAPTER, budget
 from screwkin.servo.bus import Bus, open_line
 from screwkin.servo.gate import Bounds
-from screwkin.servo.player import Frames, Player, PlayOutcome, PlaySettings, State, describe, frames_of
+from screwkin.servo.player import Frames, Player, PlayOutcome, PlaySettings, State, describe
 from screwkin.servo.servo_map import ServoMap
 from screwkin.servo.virtual.bus import SimulatedClock, VirtualBus
 from screwkin.servo.virtual.faults import InjectedFault
@@ -63,13 +63,11 @@ def send(
     faults = injected_faults(inject_fault, trouble)
     if faults and not virtual:
         raise InputError("--inject-fault is for virtual servos; add --virtual")
-    may = ready(trajectory, robot or None)
     settings = PlaySettings(
         rate=rate, torque=torque, far=_distance(far), on_fault=_state(on_fault), at_end=_state(at_end)
     )
-    servos = ServoMap.of(may.robot)
-    bounds = Bounds.of(may.robot, servos, torque)
-    frames = frames_of(bounds, may.trajectory, rate)
+    may = ready(trajectory, robot or None, settings)
+    servos, bounds, frames = may.servos, may.bounds, may.frames
     carried = budget(bounds.profiles, servos.baud)
     if rate > carried.limit:
         raise InputError(f"--rate {rate:g} Hz is more than the bus carries: {carried.limit:.0f} Hz")
@@ -80,6 +78,7 @@ def send(
         "bus_limit_hz": carried.limit,
         "full_read_hz": carried.full_rate,
         "reads_per_frame": carried.reads(rate),
+        "deviation_mm": 1e3 * may.deviation,
     }
     if not go:
         _print_dry(trajectory, frames, bounds, facts, as_json)
@@ -153,7 +152,8 @@ def _print_dry(path: Path, frames: Frames, bounds: Bounds, facts: dict[str, Any]
         )
         return
     print(
-        f"{path}: {len(frames.q)} frames of {len(bounds.ids)} servos at {frames.rate:g} Hz, within limits\n"
+        f"{path}: {len(frames.q)} frames of {len(bounds.ids)} servos at {frames.rate:g} Hz, within limits "
+        f"and up to {facts['deviation_mm']:.1f} mm from the validated path\n"
         f"The bus carries at most {facts['bus_limit_hz']:.0f} frames per second, "
         f"{facts['full_read_hz']:.0f} with every servo read in each; "
         f"at {frames.rate:g} Hz it reads {facts['reads_per_frame']} servos per frame.\n"

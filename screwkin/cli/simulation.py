@@ -11,8 +11,9 @@ import numpy as np
 
 from screwkin.analysis.account import Account
 from screwkin.analysis.engines import ENGINES, Engine, SimulatedCompliance
-from screwkin.analysis.validate import Criteria, Validation
+from screwkin.analysis.validate import Validation
 from screwkin.analysis.validate import validate as validated
+from screwkin.analysis.verdict import Criteria, verdict_of
 from screwkin.cli.output import plain, progress_bar, remark
 from screwkin.errors import UnknownNameError
 from screwkin.files import atomic_write
@@ -74,7 +75,8 @@ def simulate_to_files(account: Account, folder: Path, verdict: Path, wish: Wish)
             check_solver=wish.check_solver,
         )
     with atomic_write(verdict) as file:
-        file.write(json.dumps(plain(check.to_dict()), indent=2, allow_nan=False) + "\n")
+        data = verdict_of(account.robot, trajectory, check).to_dict()
+        file.write(json.dumps(plain(data), indent=2, allow_nan=False) + "\n")
     film = None
     if camera is not None and check.pictures:
         film = save_gif(folder / "walk.gif", check.pictures, trajectory.duration / (camera.pictures - 1))

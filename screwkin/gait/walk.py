@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import hashlib
-from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, pose_from_array, unstack
 from screwkin.errors import expect
+from screwkin.files import text_sha256, versions
 from screwkin.gait.balance import ground_margin, ground_reaction, soles_on_floor
 from screwkin.gait.driven import driven
 from screwkin.gait.plan import Plan, plan
@@ -18,6 +18,7 @@ from screwkin.gait.stance import stance_of
 from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.mechanism.choice import closed_mechanism
 from screwkin.mechanism.rates import block_names
+from screwkin.model.library import ROBOTS, data_folder
 from screwkin.model.robot import Robot, robot_text
 from screwkin.trajectory import Trajectory
 
@@ -87,7 +88,8 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
             "robot": {
                 "name": robot.name,
                 "table": table,
-                "sha256": hashlib.sha256(table.encode()).hexdigest(),
+                "sha256": text_sha256(table),
+                "path": _table_file(robot),
             },
             "gait": gait.to_dict(),
             "steps": steps,
@@ -95,10 +97,18 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
             "closure": float(solution.residual.max()),
             "sigma": dict(zip(block_names(mechanism), motion.sigma.min(axis=0).tolist(), strict=True)),
             "notes": [*planned.notes, *drive.notes],
-            "versions": {name: _version(name) for name in TRACED},
+            "versions": versions(*TRACED),
             "command": command,
         },
     )
+
+
+def _table_file(robot: Robot) -> str:
+    """The file of the robot's own table; none for a bundled robot, or one edited since it was read."""
+    path = Path(robot.path) if robot.text_matches and robot.path else None
+    if path is None or not path.is_file() or path.resolve().is_relative_to(data_folder(ROBOTS).resolve()):
+        return ""
+    return str(path.resolve())
 
 
 def _tip_poses(robot: Robot, planned: Plan, q: Array) -> dict[str, Array]:
@@ -111,10 +121,3 @@ def _tip_poses(robot: Robot, planned: Plan, q: Array) -> dict[str, Array]:
         else as_array(T @ pose_in_base(robot, D, tip), (len(q),))
         for tip in robot.tip_names
     }
-
-
-def _version(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return "unknown"

@@ -126,7 +126,7 @@ def validation_numbers(check: Validation) -> list[Number]:
 
 def _repetitions(check: Validation) -> list[Number]:
     """The numbers of runs under other frictions and time steps."""
-    row = check.repeated
+    row = check.study
     if row is None:
         return []
     fell = Number("repeated runs", str(row.runs), f"{row.fallen} fell")

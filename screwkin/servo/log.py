@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
 from screwkin.errors import InputError
-from screwkin.files import atomic_write_bytes, npz_bytes, read_npz
+from screwkin.files import atomic_write_bytes, npz_bytes, read_file, read_json, read_npz
 
 MEASURED = ("position", "speed", "load", "voltage", "temperature", "read_at")
 _GROWTH = 2
@@ -131,7 +131,7 @@ def load_log(path: str | Path) -> PlayLog:
     """
     path = Path(path)
     try:
-        arrays = read_npz(path.read_bytes())
+        arrays = read_npz(read_file(path))
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     except InputError as error:
@@ -150,8 +150,8 @@ def load_log(path: str | Path) -> PlayLog:
             kind = f"{arrays[name].dtype} {arrays[name].shape}"
             raise InputError(f"{path}: {name} is {kind}, expected float64 {shape}; the log is damaged")
     try:
-        meta = json.loads(str(arrays["meta"]))
-    except ValueError:
+        meta = read_json(str(arrays["meta"]))
+    except InputError:
         meta = None
     if not isinstance(meta, dict):
         raise InputError(f"{path}: meta is not the text of a JSON object; the log is damaged")

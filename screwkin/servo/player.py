@@ -280,14 +280,18 @@ class Player:
         raise PlayStopped(ServoFault("interrupted", "", -1, self._time(), "stopped by the user"))
 
     def _read(self, goal: Array) -> None:
-        """Read servos in turn until the next frame is near; who did not answer is first in the next frame."""
+        """Read servos in turn until the next frame is near; who did not answer is first in the next frame.
+
+        One is read wherever a reading of usual length fits: at the highest rates nothing else would see them.
+        """
         again: list[int] = []
         estimate = self._estimate()
         if self._grouped() != "none":
             self._read_group(goal)
             return
-        for _ in range(len(self._queue)):
-            if self.bus.clock.now() + 2.0 * estimate > self._due:  # the next may take longer than the mean
+        for count in range(len(self._queue)):
+            spare = min(count + 1.0, 2.0) * estimate  # the next may take longer than the mean
+            if self.bus.clock.now() + spare > self._due:
                 break
             k = self._queue.popleft()
             try:

@@ -14,12 +14,15 @@ servo angle = direction * joint angle + zero.
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from typing import Any
 
 from screwkin.errors import Fault, InputError, TableError, UnknownNameError
+from screwkin.files import text_sha256
 from screwkin.model.robot import Robot
 from screwkin.servo.profiles import (
     Profile,
@@ -118,6 +121,11 @@ class ServoMap:
         """Bus ids in the order of the joints."""
         return tuple(servo.id for servo in self.joints)
 
+    @cached_property
+    def sha256(self) -> str:
+        """SHA-256 of all that decides which ticks go where: bus, ids, directions, zeros and profiles."""
+        return text_sha256(json.dumps(self, sort_keys=True, default=_entries))
+
     def joint(self, name: str) -> ServoJoint:
         """The servo of a joint.
 
@@ -139,6 +147,13 @@ class ServoMap:
             if servo.id == servo_id:
                 return servo
         raise UnknownNameError("servo id", str(servo_id), tuple(map(str, self.ids)))
+
+
+def _entries(value: Any) -> dict[str, Any]:
+    """The entries of a mapping or record."""
+    if isinstance(value, Mapping):
+        return dict(value)
+    return {f.name: getattr(value, f.name) for f in fields(value)}
 
 
 def _profile_of(servos: Mapping[str, Any], joint: str) -> Profile:

@@ -11,7 +11,8 @@ import pytest
 import screwkin as sk
 from screwkin.analysis.agreement import agreed, settled
 from screwkin.analysis.engines import Refinement, SimulatedCompliance, engines_for, opened
-from screwkin.analysis.validate import Criteria, Validation, judged, validate
+from screwkin.analysis.validate import Validation, judged, validate
+from screwkin.analysis.verdict import Criteria
 from screwkin.errors import InputError, MissingDependencyError
 from screwkin.sim.compliant import Compliance
 from screwkin.sim.kinematic import KinematicBackend
@@ -32,7 +33,8 @@ def walk(robot: sk.Robot) -> sk.Trajectory:
 def perfect(robot: sk.Robot, walk: sk.Trajectory) -> Validation:
     """A verdict that passes, in the name of an engine with forces."""
     run = simulate(robot, walk, KinematicBackend(robot, dt=0.01))
-    return judged(robot, walk, replace(run, engine="pybullet"), Criteria())
+    check = judged(robot, walk, replace(run, engine="pybullet"), Criteria())
+    return replace(check, passed=True, reasons=(), zmp_rms_mm=0.1, zmp_max_mm=0.4)
 
 
 def named(check: Validation, engine: str, **changes: Any) -> Validation:

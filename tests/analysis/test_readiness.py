@@ -15,6 +15,7 @@ from screwkin.gait.walk import walk
 from screwkin.model.library import find_robot
 from screwkin.model.table import load_robot
 from screwkin.trajectory import Trajectory, load_trajectory
+from tests.verdicts import passing
 
 
 @pytest.fixture(scope="module")
@@ -24,14 +25,14 @@ def made() -> Trajectory:
 
 def stored(folder: Path, trajectory: Trajectory, **verdict: object) -> Path:
     """The trajectory with a verdict beside it that says it passed, but for what is told."""
-    path = trajectory.save(folder / "trajectory.npz")
-    passed = {
-        "passed": True,
-        "reasons": [],
-        "trajectory_sha256": load_trajectory(path).sha256,
-        "torque_use": {"right_knee": 0.6},
-    }
-    (folder / "validation.json").write_text(json.dumps(passed | verdict))
+    return passing(trajectory.save(folder / "trajectory.npz"), **verdict)
+
+
+def forged(path: Path, trajectory: Trajectory) -> Path:
+    """The trajectory in place of the one at the path, whose verdict now names it."""
+    verdict = json.loads((path.parent / "validation.json").read_text())
+    verdict["trajectory_sha256"] = load_trajectory(trajectory.save(path)).sha256
+    (path.parent / "validation.json").write_text(json.dumps(verdict))
     return path
 
 
@@ -61,7 +62,7 @@ def test_a_walk_that_failed_is_refused_with_the_reasons(tmp_path, made):
 
 @pytest.mark.parametrize("passed", ["true", 1, None, [True]])
 def test_only_true_is_passed(tmp_path, made, passed):
-    assert "did not pass" in refusal(stored(tmp_path, made, passed=passed))
+    assert "passed: input should be a valid boolean" in refusal(stored(tmp_path, made, passed=passed))
 
 
 def test_the_verdict_on_another_walk_is_refused(tmp_path, made):
@@ -107,21 +108,30 @@ def test_a_robot_whose_table_changed_since_is_refused(tmp_path, made):
 
 def test_a_forged_hash_of_the_table_is_refused(tmp_path, made):
     robot = {**made.meta["robot"], "sha256": "0" * 64}
-    path = stored(tmp_path, replace(made, meta={**made.meta, "robot": robot}))
+    path = forged(stored(tmp_path, made), replace(made, meta={**made.meta, "robot": robot}))
     assert "changed since" in refusal(path)
 
 
-def test_a_walk_that_tells_no_robot_is_refused(tmp_path, made):
-    assert "which robot" in refusal(stored(tmp_path, replace(made, meta={})))
+def test_a_walk_of_no_robot_is_refused(tmp_path, made):
+    assert "which robot" in refusal(forged(stored(tmp_path, made), replace(made, meta={})))
 
 
-def test_a_robot_of_ones_own_must_be_named(tmp_path, made):
-    text = made.meta["robot"]["table"].replace('name = "bioloid"', 'name = "mine"')
-    table = tmp_path / "mine.toml"
-    table.write_text(text)
-    path = stored(tmp_path, walk(load_robot(table), load_gait("smooth"), 1))
-    assert "--robot" in refusal(path)
-    assert ready(path, table).robot.name == "mine"
+def test_the_table_file_that_a_walk_came_from_is_compared(tmp_path, made):
+    """Also where its robot bears the name of a bundled one: the servo map at hand is that of the file."""
+    for name in ("mine", "bioloid"):
+        table = tmp_path / f"{name}.toml"
+        text = made.meta["robot"]["table"].replace('name = "bioloid"', f'name = "{name}"')
+        table.write_text(text)
+        path = stored(tmp_path, walk(load_robot(table), load_gait("smooth"), 1))
+        assert ready(path).robot.path == str(table)
+        assert ready(path, table).robot.name == name
+        table.write_text(text.replace("right_knee = 13", "right_knee = 31"))
+        assert table.read_text() != text
+        refused = refusal(path)
+        assert f"another table than {table}" in refused
+        assert "--robot" in refused
+        table.unlink()
+        assert f"whose table {table} is not there. Name it: --robot" in refusal(path)
 
 
 def test_a_robot_that_is_not_there_is_no_matter_of_safety(tmp_path, made):

@@ -12,9 +12,11 @@ import numpy as np
 import pytest
 
 import screwkin as sk
-from screwkin.analysis.validate import Criteria, Validation, judged, validate
+from screwkin.analysis.validate import Validation, judged, validate
+from screwkin.analysis.verdict import Criteria
 from screwkin.errors import InputError, UnknownNameError
-from screwkin.model.robot import Robot
+from screwkin.files import text_sha256
+from screwkin.model.robot import Robot, robot_text
 from screwkin.sim.camera import Camera
 from screwkin.sim.kinematic import KinematicBackend
 from screwkin.sim.run import Run, simulate
@@ -52,8 +54,15 @@ def walk(robot: Robot) -> Trajectory:
 @pytest.fixture(scope="module")
 def perfect(robot: Robot, walk: Trajectory) -> Run:
     """The plan carried out to the letter, in the name of an engine with forces."""
-    run = simulate(robot, walk, KinematicBackend(robot, dt=0.01))
-    return replace(run, engine="pybullet")
+    return pressing(robot, simulate(robot, walk, KinematicBackend(robot, dt=0.01)), walk)
+
+
+def pressing(robot: Robot, run: Run, walk: Trajectory) -> Run:
+    """A run of perfect tracking as if of an engine with forces: the robot's weight at the planned ZMP."""
+    x, y = (np.interp(run.time - run.dt, walk.time, axis) for axis in walk.zmp.T)
+    weight, none = np.full_like(x, 9.81 * float(robot.mass)), np.zeros_like(x)
+    wrench = np.stack([y * weight, -x * weight, none, none, none, weight], axis=1)
+    return replace(run, engine="pybullet", ground_wrench=wrench)
 
 
 @pytest.fixture(scope="module")
@@ -163,7 +172,7 @@ def test_the_end_may_be_10_mm_off(
 def test_on_a_long_way_the_end_may_be_5_percent_off(robot: Robot) -> None:
     """Six steps of 0.1 m: 30 mm are allowed."""
     long = planned(robot, steps=6, Tc=0.8)
-    run = replace(simulate(robot, long, KinematicBackend(robot, dt=0.01)), engine="pybullet")
+    run = pressing(robot, simulate(robot, long, KinematicBackend(robot, dt=0.01)), long)
     T = run.T_world_base.copy()
     T[-1, 0, 3] += 0.029
     assert verdict(robot, long, replace(run, T_world_base=T)) == ()
@@ -173,7 +182,7 @@ def test_on_a_long_way_the_end_may_be_5_percent_off(robot: Robot) -> None:
 
 def test_a_margin_that_only_the_file_claims_does_not_count(robot: Robot) -> None:
     tipping = planned(robot, sway=0.0)
-    run = replace(simulate(robot, tipping, KinematicBackend(robot, dt=0.01)), engine="pybullet")
+    run = pressing(robot, simulate(robot, tipping, KinematicBackend(robot, dt=0.01)), tipping)
     claimed = replace(tipping, margin=np.ones(tipping.samples))
     assert verdict(robot, claimed, run) == verdict(robot, tipping, run)
     assert "planned ZMP leaves the support polygon" in verdict(robot, claimed, run)[0]
@@ -197,6 +206,48 @@ def test_a_plan_whose_zmp_leaves_the_soles_fails_even_if_it_stands(
     assert verdict(robot, replace(walk, margin=margin), perfect) == (
         "planned ZMP leaves the support polygon by 1.2 mm",
     )
+
+
+SERIES = ("T_world_base", "q", "qd", "torque", "T_world_foot", "ground_wrench", "foot_force")
+
+
+@pytest.mark.parametrize("name", SERIES)
+def test_what_the_simulation_did_not_measure_fails_by_name(
+    robot: Robot, walk: Trajectory, perfect: Run, name: str
+) -> None:
+    series = np.array(getattr(perfect, name))
+    series[100] = np.nan
+    assert (
+        f"no number for {name} at {perfect.time[100]:.2f} s"
+        in verdict(robot, walk, replace(perfect, **{name: series}))[0]
+    )
+
+
+def test_a_run_without_ground_forces_fails(robot: Robot, walk: Trajectory, perfect: Run) -> None:
+    nothing = replace(perfect, ground_wrench=np.zeros_like(perfect.ground_wrench))
+    assert "no ZMP was measured: nothing pressed on the floor" in verdict(robot, walk, nothing)
+
+
+def test_an_edited_robot_is_judged_as_edited_and_recorded_so(
+    robot: Robot, walk: Trajectory, perfect: Run
+) -> None:
+    assert judged(robot, walk, perfect, Criteria()).robot_sha256 == walk.meta["robot"]["sha256"]
+    heavy = replace(robot, links=tuple(replace(link, mass=1.1 * link.mass) for link in robot.links))
+    check = judged(heavy, walk, perfect, Criteria())
+    assert check.robot_sha256 == text_sha256(robot_text(heavy)) != walk.meta["robot"]["sha256"]
+    assert "judged with another table" in check.warnings[0]
+
+
+def test_walks_of_edited_robots_record_the_edited_table(robot: Robot) -> None:
+    gait = sk.load_gait("walk")
+    torso = robot.links[0]
+    for edited in (
+        robot.replace(masses={torso.name: 2 * torso.mass}),
+        replace(robot, links=(replace(torso, mass=2 * torso.mass), *robot.links[1:])),
+    ):
+        recorded = sk.walk(edited, gait, steps=1).meta["robot"]
+        assert sk.robot_from_text(recorded["table"]).links[0].mass == pytest.approx(2 * torso.mass)
+        assert recorded["path"] == ""
 
 
 def test_unknown_engines_and_foreign_trajectories_are_refused(robot: Robot, walk: Trajectory) -> None:

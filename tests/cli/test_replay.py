@@ -10,6 +10,7 @@ import pytest
 
 from screwkin.cli import run
 from screwkin.trajectory import load_trajectory
+from tests.verdicts import passing
 
 
 @pytest.fixture(scope="module")
@@ -19,8 +20,7 @@ def sent(tmp_path_factory) -> Path:
     path = folder / "trajectory.npz"
     words = ["walk", "bioloid", "--gait", "smooth", "--steps", "1", "--no-plots", "-o", str(folder), "--json"]
     assert run(words) == 0
-    verdict = {"passed": True, "trajectory_sha256": load_trajectory(path).sha256, "zmp_rms_mm": 0.0}
-    (folder / "validation.json").write_text(json.dumps(verdict), encoding="utf-8")
+    passing(path)
     log = str(folder / "sent")
     assert run(["send", str(path), "--virtual", "--go", "-o", log, "--json"]) == 0
     early = ["--inject-fault", "pulled@2.5", "-o", str(folder / "cut")]
