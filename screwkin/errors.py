@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar, overload
+
+T = TypeVar("T")
 
 
 class ScrewkinError(Exception):
@@ -128,6 +130,22 @@ def near(name: str, valid: Iterable[str]) -> str:
     """A question for the nearest valid name, with a blank behind it: ``Did you mean 'knee'?``; or nothing."""
     close = difflib.get_close_matches(str(name), list(valid), n=1)
     return f"Did you mean {close[0]!r}? " if close else ""
+
+
+@overload
+def one_of(what: str, name: str, valid: Mapping[str, T]) -> T: ...
+@overload
+def one_of(what: str, name: str, valid: Iterable[T]) -> T: ...
+def one_of(what: str, name: str, valid: Any) -> Any:
+    """The entry of a name, out of values by name or of names that stand for themselves.
+
+    Raises:
+        UnknownNameError: there is none; ``what`` says what the name is of, and the valid ones are listed.
+    """
+    entries = valid if isinstance(valid, Mapping) else {str(one): one for one in valid}
+    if name not in entries:
+        raise UnknownNameError(what, str(name), list(entries))
+    return entries[name]
 
 
 def expect(value: object, kind: type | tuple[type, ...], name: str, give: str) -> None:

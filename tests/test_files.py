@@ -2,12 +2,26 @@
 
 from __future__ import annotations
 
+import io
+import json
+import zipfile
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from screwkin.errors import OutputError, TrajectoryError
-from screwkin.files import atomic_path, atomic_write, atomic_write_bytes, make_folder
+from screwkin import files
+from screwkin.errors import InputError, OutputError, TrajectoryError
+from screwkin.files import (
+    DEEPEST,
+    atomic_path,
+    atomic_write,
+    atomic_write_bytes,
+    make_folder,
+    read_file,
+    read_json,
+    read_npz,
+)
 
 
 def test_a_file_appears_under_its_name_only_when_complete(tmp_path: Path) -> None:
@@ -66,3 +80,44 @@ def test_a_folder_is_made_with_its_parents(tmp_path: Path) -> None:
     assert made.is_dir()
     assert make_folder(made) == made
     assert list(made.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "depth"),
+    [("[" * 65 + "]" * 65, 65), ('{"a":' * 3000 + "1" + "}" * 3000, 3000), ("[" * 10**6, 10**6)],
+)
+def test_json_nested_too_deep_is_refused_and_not_recursed_into(text: str, depth: int) -> None:
+    with pytest.raises(InputError, match=f"nested {depth:,} deep, at most {DEEPEST}"):
+        read_json(text)
+
+
+@pytest.mark.parametrize(
+    "data",
+    [{"a": ["[" * 100, '"{' * 100, "\\", '\\"[' * 99]}, [[[]]] * 1000, "[" * 100, 1.5, {"{": {"}": "]"}}],
+)
+def test_brackets_within_strings_are_no_depth(data: object) -> None:
+    assert read_json(json.dumps(data)) == data
+
+
+def test_what_is_no_json_is_one_clear_error() -> None:
+    for text in ("", "{", "]", "nil", '"a', "{'a': 1}"):
+        with pytest.raises(InputError, match="no JSON"):
+            read_json(text)
+
+
+def test_an_archive_that_unpacks_to_too_much_is_refused_unread(monkeypatch: pytest.MonkeyPatch) -> None:
+    out, member = io.BytesIO(), io.BytesIO()
+    np.lib.format.write_array(member, np.zeros(10**6))
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("q.npy", member.getvalue())
+    assert len(read_npz(out.getvalue())["q"]) == 10**6
+    monkeypatch.setattr(files, "LARGEST", 10**6)
+    assert len(out.getvalue()) < files.LARGEST
+    with pytest.raises(InputError, match="it unpacks to 8 MB, more than the 1 MB"):
+        read_npz(out.getvalue())
+
+
+def test_a_file_without_end_is_not_read_to_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(files, "LARGEST", 10**6)
+    with pytest.raises(InputError, match="more than the 1 MB"):
+        read_file("/dev/zero")

@@ -11,6 +11,9 @@ import numpy as np
 Array = np.ndarray[Any, np.dtype[Any]]
 """An array of any shape, float64 unless a docstring says otherwise."""
 
+Integers = np.ndarray[Any, np.dtype[np.int64]]
+"""An array of integers."""
+
 
 def numpy_of(*arrays: object) -> Any:
     """The module that computes with such arrays: ``jax.numpy`` if one is a JAX array, else ``numpy``."""

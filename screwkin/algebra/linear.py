@@ -37,12 +37,12 @@ def orthogonal(columns: Sequence[Sequence[Scalar]], wanted: Sequence[Scalar]) ->
         shares[-1].insert(0, size)
         right.append(along)
         volume = times(volume, size)
-    found: list[Scalar] = []
+    solution: list[Scalar] = []
     for k in reversed(range(len(columns))):
         size, *others = shares[k]
-        known = product(others, found)
-        found.insert(0, minus(right[k], known) / size)
-    return found, volume
+        known = product(others, solution)
+        solution.insert(0, minus(right[k], known) / size)
+    return solution, volume
 
 
 def product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from screwkin.algebra.arrays import Array
+from screwkin.algebra.arrays import Array, Integers
 
-Indices = np.ndarray[Any, np.dtype[np.int64]]
-Residual = Callable[[Array, Indices], tuple[Array, Array]]
+Residual = Callable[[Array, Integers], tuple[Array, Array]]
 """(x (A, n), indices of the samples (A,)) to residual (A, m) and Jacobian (A, m, n) with J dx = residual."""
 
 
@@ -21,7 +19,7 @@ class NewtonResult:
 
     x: Array
     residual: Array
-    iterations: Indices
+    iterations: Integers
 
 
 def newton(

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
-Integers = np.ndarray[Any, np.dtype[np.int64]]
+from screwkin.algebra.arrays import Integers
 
 
 def components(pattern: Sequence[Sequence[bool]] | Integers) -> list[tuple[list[int], list[int]]]:

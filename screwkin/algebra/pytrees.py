@@ -14,7 +14,7 @@ _waiting: list[tuple[Any, tuple[str, ...]]] = []
 def pytree(*static: str) -> Callable[[type[T]], type[T]]:
     """Make a dataclass a pytree, written below ``@dataclass``; all fields but the ``static`` are leaves.
 
-    JAX learns of the class as soon as a record is made while JAX is loaded. Static fields are compared, so
+    JAX learns of the class as soon as a record is created while JAX is loaded. Static fields are compared, so
     they hold names and other hashable data.
     """
 

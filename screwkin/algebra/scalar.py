@@ -120,11 +120,6 @@ def structural(x: float) -> Scalar:
     return int(x) if x in (0.0, 1.0, -1.0) else x
 
 
-def dense(x: Scalar) -> Scalar:
-    """Structure made a number again, for differentiating by it."""
-    return float(x) if type(x) is int else x
-
-
 def sin(x: Scalar) -> Scalar:
     """Sine; of a structural 0 it is structural 0."""
     return 0 if _is(x, 0) else namespace(x).sin(x)
@@ -209,24 +204,6 @@ atanc = entire(
 """atan(t)/t as a function of t squared."""
 
 
-def _derivative_series() -> tuple[list[Fraction], ...]:
-    """Coefficients of the four entire functions of the exponential's derivative (see ``se3.dexp``)."""
-    half = Fraction(1, 2)
-    # In t2: theta sin(theta) = t2 sin(theta)/theta, so its coefficient of t2**k is that of sinc at k - 1.
-    f1 = [half * (-_series(k, 1) - _series(k + 1, 0, 4)) for k in _TERMS]
-    f2 = [half * (_series(k + 1, -5) + _series(k + 1, 0, 1)) for k in _TERMS]
-    f3 = [half * (-_series(k + 1, 1) - _series(k + 2, 0, 2)) for k in _TERMS]
-    f4 = [half * (_series(k + 2, -3) + _series(k + 2, 0, 1)) for k in _TERMS]
-    return f1, f2, f3, f4
-
-
-_F1, _F2, _F3, _F4 = _derivative_series()
-dexp1 = entire(lambda t: (4 - t * sin(t) - 4 * cos(t)) / (2 * t**2), _F1, threshold=4.0)
-dexp2 = entire(lambda t: (4 * t - 5 * sin(t) + t * cos(t)) / (2 * t**3), _F2, threshold=4.0)
-dexp3 = entire(lambda t: (2 - t * sin(t) - 2 * cos(t)) / (2 * t**4), _F3, threshold=4.0)
-dexp4 = entire(lambda t: (2 * t - 3 * sin(t) + t * cos(t)) / (2 * t**5), _F4, threshold=9.0)
-
-
 def _even_bernoulli(count: int) -> list[Fraction]:
     """Bernoulli numbers B_0, B_2, B_4 and so on."""
     even = [Fraction(1)]
@@ -236,25 +213,8 @@ def _even_bernoulli(count: int) -> list[Fraction]:
     return even
 
 
-_B = _even_bernoulli(34)
+_B = _even_bernoulli(22)
 
-
-def _inverse_series(terms: int = 32) -> tuple[list[Fraction], list[Fraction]]:
-    """Coefficients of the two entire functions of ``se3.dlog``.
-
-    The operator series is sum B_n ad^n / n!. On se(3) ad (ad^2 + theta^2)^2 = 0, so the even powers reduce to
-    ad^2 and ad^4: ad^(2k) = (-t2)^(k-2) ((k - 1) ad^4 + (k - 2) t2 ad^2) for k >= 1.
-    """
-    g2, g4 = [Fraction(0)] * (terms + 2), [Fraction(0)] * (terms + 2)
-    for k in range(1, terms + 2):
-        b = (-1) ** k * _B[k] / math.factorial(2 * k)
-        g2[k - 1] += b * (k - 2)
-        if k >= 2:
-            g4[k - 2] += b * (k - 1)
-    return g2[:terms], g4[:terms]
-
-
-_G2, _G4 = _inverse_series()
 
 vlog = entire(
     lambda t: (1 - t * sin(t) / (2 * (1 - cos(t)))) / (t * t),
@@ -262,9 +222,6 @@ vlog = entire(
     threshold=4.0,
 )
 """(1 - (theta/2) cot(theta/2))/theta^2 as a function of theta squared: the inverse of so(3)'s V."""
-
-dlog2 = entire(lambda t: 2 / t**2 + (t + 3 * sin(t)) / (4 * t * (cos(t) - 1)), _G2, threshold=10.0)
-dlog4 = entire(lambda t: 1 / t**4 + (t + sin(t)) / (4 * t**3 * (cos(t) - 1)), _G4, threshold=10.0)
 
 
 def root(x: Scalar) -> Scalar:

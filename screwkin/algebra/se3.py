@@ -14,7 +14,7 @@ import numpy as np
 
 from screwkin.algebra import scalar
 from screwkin.algebra.pytrees import register_with_jax, remember
-from screwkin.algebra.scalar import Scalar, dense, is_jax, is_symbolic, minus, over, plus, times
+from screwkin.algebra.scalar import Scalar, is_jax, is_symbolic, minus, over, plus, times
 
 R = TypeVar("R")
 
@@ -22,10 +22,10 @@ R = TypeVar("R")
 @dataclass_transform(frozen_default=True, eq_default=False)
 def record(cls: type[R]) -> type[R]:
     """A frozen dataclass that NumPy leaves alone in operators and that is a JAX pytree."""
-    made = dataclass(frozen=True, eq=False)(cls)
-    made.__array_ufunc__ = None  # type: ignore[attr-defined]
-    remember(made)
-    return made
+    frozen = dataclass(frozen=True, eq=False)(cls)
+    frozen.__array_ufunc__ = None  # type: ignore[attr-defined]
+    remember(frozen)
+    return frozen
 
 
 def leaves(value: Any) -> list[Scalar]:
@@ -40,11 +40,6 @@ def map_scalars(function: Callable[[Scalar], Scalar], value: Any) -> Any:
     if hasattr(value, "__dataclass_fields__"):
         return type(value)(*(map_scalars(function, getattr(value, f.name)) for f in fields(value)))
     return function(value)
-
-
-def densified(value: Any) -> Any:
-    """The record with structural 0, 1, -1 turned into numbers, so that one may differentiate by them."""
-    return map_scalars(dense, value)
 
 
 @record
@@ -269,36 +264,17 @@ def log(pose: Pose) -> Twist:
     return Twist(w, pose.p - once / 2 + cross(w, once) * scalar.vlog(t2))
 
 
-def dexp(twist: Twist, rate: Twist) -> Twist:
-    """Spatial twist of exp(twist(t)) when twist changes at ``rate`` (left Jacobian of SE(3))."""
-    t2 = dot(twist.omega, twist.omega)
-    value, power = rate, rate
-    for coefficient in (scalar.dexp1, scalar.dexp2, scalar.dexp3, scalar.dexp4):
-        power = bracket(twist, power)
-        value = value + power * coefficient(t2)
-    return value
-
-
-def dlog(twist: Twist, spatial: Twist) -> Twist:
-    """Rate of log(T(t)) = twist when T moves with the spatial twist (inverse of ``dexp``)."""
-    t2 = dot(twist.omega, twist.omega)
-    first = bracket(twist, spatial)
-    second = bracket(twist, first)
-    fourth = bracket(twist, bracket(twist, second))
-    return spatial - first / 2 + second * scalar.dlog2(t2) + fourth * scalar.dlog4(t2)
-
-
-def unstack(array: Any, axis: int = -1) -> list[Scalar]:
-    """The scalars along one axis of an array: floats for a single vector, batches otherwise."""
+def unstack(array: Any) -> list[Scalar]:
+    """The scalars along the last axis of an array: floats for a single vector, batches otherwise."""
     if is_jax(array):
         import jax.numpy as jnp
 
         register_with_jax()
-        return list(jnp.moveaxis(array, axis, 0))
+        return list(jnp.moveaxis(array, -1, 0))
     array = np.asarray(array)
     if array.ndim == 1 and array.dtype != object:
         return list(array.tolist())
-    return list(np.ascontiguousarray(np.moveaxis(array, axis, 0)))
+    return list(np.ascontiguousarray(np.moveaxis(array, -1, 0)))
 
 
 def vector_from_array(array: Any) -> Vector:

@@ -2,8 +2,8 @@
 
 Reflections bring the matrix to two diagonals; the squares of these give the characteristic polynomial of
 A^T A by sums of products without a subtraction, so that it keeps its digits however near to singular A is;
-Laguerre's iteration finds the outermost roots from outside. No branches on values: what the formula leaves in
-doubt (two singular values that nearly fall together at an end) its error bound tells.
+Laguerre's iteration finds the outermost roots from outside. No branches on values: where the
+formula is not certified (two singular values that nearly fall together at an end) its error bound says so.
 
 Source: Golub and Kahan (1965) for the two diagonals; Parlett (1964) for Laguerre's iteration.
 """
@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 
@@ -52,26 +53,18 @@ def extreme_singular_values(columns: Sequence[Sequence[Scalar]]) -> Extremes:
         columns: n columns of n scalars. Exact zeros save work, and rows and columns that share no entries
             with the others are matrices of their own.
     """
-    found: Extremes | None = None
+    parts = []
     for block in _blocks(columns):
         sums = symmetric_functions(*two_diagonals(block))
         (low, low_error), (high, high_error) = _outermost(sums, 1), _outermost(sums, -1)
-        part = Extremes(root(low), root(high), plus(low_error, high_error))
-        found = part if found is None else _joined(found, part)
-    assert found is not None
-    return found
+        parts.append(Extremes(root(low), root(high), plus(low_error, high_error)))
+    return reduce(_joined, parts)
 
 
 def least_singular_value(columns: Sequence[Sequence[Scalar]]) -> tuple[Scalar, Scalar]:
     """Smallest singular value alone, and its error (see ``Extremes``): for about two thirds of the work."""
-    found: list[tuple[Scalar, Scalar]] = []
-    for block in _blocks(columns):
-        low, error = _outermost(symmetric_functions(*two_diagonals(block)), 1)
-        found.append((root(low), error))
-    value, error = found[0]
-    for other, its_error in found[1:]:
-        value, error = least(value, other), plus(error, its_error)
-    return value, error
+    roots = [_outermost(symmetric_functions(*two_diagonals(block)), 1) for block in _blocks(columns)]
+    return reduce(least, (root(low) for low, _ in roots)), reduce(plus, (error for _, error in roots))
 
 
 def _joined(a: Extremes, b: Extremes) -> Extremes:

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.algebra.se3 import as_array, pose_from_array, unstack
+from screwkin.algebra.se3 import as_array, norm, pose_from_array, rotation_from_array, rotation_log, unstack
 from screwkin.errors import TableError, TrajectoryError
 from screwkin.files import text_sha256
 from screwkin.gait.balance import Balance, zmp
@@ -177,7 +177,8 @@ def closure_of(robot: Robot, trajectory: Trajectory, motion: Trajectory) -> dict
     for tip, recorded in trajectory.T_world_tip.items():
         reached = as_array(T @ pose_in_base(robot, D, tip), (trajectory.samples,))
         gap = float(np.linalg.norm(reached[:, :3, 3] - recorded[:, :3, 3], axis=1).max())
-        errors[tip] = (gap, float(_angle(reached[:, :3, :3], recorded[:, :3, :3]).max()))
+        turn = norm(rotation_log(rotation_from_array(reached[:, :3, :3] @ recorded[:, :3, :3].mT)))
+        errors[tip] = (gap, float(turn.max()))
     return errors
 
 
@@ -194,10 +195,3 @@ def check_tips(robot: Robot, trajectory: Trajectory) -> None:
         raise TrajectoryError(
             f"the trajectory has the tips {', '.join(strange)}; {robot.name} has {', '.join(robot.tip_names)}"
         )
-
-
-def _angle(A: Array, B: Array) -> Array:
-    """Angle (T,) between rotations [rad], exact for small ones."""
-    R = A @ B.swapaxes(-1, -2)
-    twice_sine = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
-    return np.asarray(np.arctan2(np.linalg.norm(twice_sine, axis=1), np.trace(R, axis1=1, axis2=2) - 1.0))

@@ -6,22 +6,20 @@ its base a walk needs one set of tables per supporting foot, whose first table r
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
 
 from screwkin.algebra.scalar import Scalar
-from screwkin.algebra.screws import AT_REST, Screw, advance, carry, displacement, transport
-from screwkin.algebra.se3 import IDENTITY, Pose, Twist
+from screwkin.algebra.screws import AT_REST, Screw, advance, carry
+from screwkin.algebra.se3 import Pose, Twist
 from screwkin.errors import InputError
 from screwkin.kinematics.positions import screws_in
+from screwkin.kinematics.serial_chain import forward
 from screwkin.model.dh import Convention, DHTable, dh_frames, dh_jacobian
 from screwkin.model.dh_csv import load_dh
 from screwkin.model.dh_derive import dh_from_screws
 from screwkin.model.robot import Robot
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -113,9 +111,7 @@ def by_screws(screws: Sequence[Screw], frame: Pose, q: Sequence[Scalar]) -> tupl
     Returns:
         The tip's pose in the base frame, and the n columns of the Jacobian: twists at the base origin.
     """
-    places = _places(screws, q, IDENTITY, lambda before, screw, theta: before @ displacement(screw, theta))
-    columns = [transport(place, screw.twist) for place, screw in zip(places, screws, strict=False)]
-    return places[-1] @ frame, columns
+    return forward(screws, q, frame)
 
 
 def by_library(screws: Sequence[Screw], frame: Pose, q: Sequence[Scalar]) -> tuple[Pose, list[Twist]]:
@@ -124,19 +120,11 @@ def by_library(screws: Sequence[Screw], frame: Pose, q: Sequence[Scalar]) -> tup
     The displacement about an axis through s0 costs a product R s0 that the next axis takes back in part;
     advancing by the difference of the axis points needs no more operations than DH frames do.
     """
-    places = _places(screws, q, AT_REST, advance)
+    places = [AT_REST]
+    for screw, theta in zip(screws, q, strict=True):
+        places.append(advance(places[-1], screw, theta))
     columns = [carry(place, screw).twist for place, screw in zip(places, screws, strict=False)]
     return places[-1] @ frame, columns
-
-
-def _places(
-    screws: Sequence[Screw], q: Sequence[Scalar], start: T, step: Callable[[T, Screw, Scalar], T]
-) -> list[T]:
-    """Displacements of the n + 1 bodies of a chain, the base among them."""
-    places = [start]
-    for screw, theta in zip(screws, q, strict=True):
-        places.append(step(places[-1], screw, theta))
-    return places
 
 
 def by_dh(table: DHTable, q: Sequence[Scalar]) -> tuple[Pose, list[Twist]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -59,14 +59,7 @@ class Facts:
             "rank": self.rank,
             "condition": self.condition,
             "singularity": [
-                {
-                    "limb": limb.limb,
-                    "sigma": limb.sigma,
-                    "near": limb.near,
-                    "joints": list(limb.joints),
-                    "cause": limb.cause,
-                }
-                for limb in self.limbs
+                {key: value for key, value in asdict(limb).items() if key != "sample"} for limb in self.limbs
             ],
         }
 

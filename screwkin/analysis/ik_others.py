@@ -1,6 +1,6 @@
 """Inverse kinematics of other libraries on the same limb, where they are installed.
 
-Each function gives None where its library is absent or does not fit the limb.
+Each function returns None where its library is absent or does not fit the limb.
 """
 
 from __future__ import annotations
@@ -67,19 +67,19 @@ def pinocchio_clik(chain: SerialChain, target: Array, settings: IkSettings) -> O
         for step in range(settings.max_iterations + 1):
             pin.forwardKinematics(model, data, x)
             gap = data.oMi[last].actInv(wanted)
-            lack = pin.log6(gap).vector
+            residual = pin.log6(gap).vector
             # The tip's own distance: the same displacement, seen at the tip.
             far = reach.actInv(gap * reach)
             if (
                 np.linalg.norm(far.translation) <= settings.position_tolerance
-                and np.linalg.norm(lack[3:]) <= settings.rotation_tolerance
+                and np.linalg.norm(residual[3:]) <= settings.rotation_tolerance
             ):
                 solved[k] = True
                 break
             if step == settings.max_iterations:
                 break
             J = -pin.Jlog6(gap.inverse()) @ pin.computeJointJacobian(model, data, x, last)
-            x = x - 0.1 * J.T @ np.linalg.solve(J @ J.T + 1e-12 * np.eye(6), lack)
+            x = x - 0.1 * J.T @ np.linalg.solve(J @ J.T + 1e-12 * np.eye(6), residual)
             iterations[k] += 1
         q[k] = x
     return Outcome(q, solved, iterations, time.perf_counter() - begin)
@@ -107,8 +107,8 @@ def eaik(chain: SerialChain, target: Array, settings: IkSettings) -> Outcome | N
         # Its tip is parallel to the base in the zero pose.
         wanted = T.copy()
         wanted[:3, :3] = T[:3, :3] @ home.T
-        found = robot.IK(wanted)
-        branches = [np.asarray(x) for x, least in zip(found.Q, found.is_LS, strict=True) if not least]
+        answer = robot.IK(wanted)
+        branches = [np.asarray(x) for x, least in zip(answer.Q, answer.is_LS, strict=True) if not least]
         if branches:
             q[k], solved[k] = min(branches, key=lambda x: float(np.abs(np.sin(x / 2)).max())), True
     seconds = time.perf_counter() - begin

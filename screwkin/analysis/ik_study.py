@@ -160,9 +160,9 @@ def measured(chain: SerialChain, data: str, target: Array, entry: Entry) -> IkRo
     count = len(target)
     start = np.zeros((count, len(chain.names)))
     begin = time.perf_counter()
-    found = solve_limb(chain, target, entry.method, start, entry.settings, (count,), nearest=False)
+    solution = solve_limb(chain, target, entry.method, start, entry.settings, (count,), nearest=False)
     seconds = time.perf_counter() - begin
-    outcome = Outcome(found.best, found.valid[:, 0], found.iterations[:, 0], seconds)
+    outcome = Outcome(solution.best, solution.valid[:, 0], solution.iterations[:, 0], seconds)
     return _row(chain, data, entry.name, entry.start, outcome, entry.settings.max_iterations)
 
 

@@ -17,6 +17,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.screws import Screw
 from screwkin.algebra.se3 import Vector, as_array, cross, dot, norm, rotate, rotation_log
 from screwkin.analysis.chains import ModelChain, by_screws
+from screwkin.kinematics.limits import TURN, turns
 from screwkin.model.dh import DHTable, dh_fk
 from screwkin.model.dh_derive import dh_from_screws
 
@@ -115,20 +116,17 @@ def table_change(before: DHTable, after: DHTable, inner: bool = False) -> tuple[
 
     ``inner`` leaves out what leads from the base to the first axis and from the last one to the tip.
     """
-    lengths, angles = [0.0], [0.0]
-    last = len(before.rows) - 1
-    for i, (a, b) in enumerate(zip(before.rows, after.rows, strict=True)):
-        if i > 0 or not inner:  # across, from the axis before
-            lengths.append(abs(b.a - a.a))
-            angles.append(abs(math.remainder(b.alpha - a.alpha, 2 * math.pi)))
-        if 0 < i < last or not inner:  # along the axis
-            lengths.append(abs(b.d - a.d))
-            angles.append(abs(math.remainder(b.offset - a.offset, 2 * math.pi)))
+    rows = zip(before.rows, after.rows, strict=True)
+    change = np.array([[b.a - a.a, b.d - a.d, b.alpha - a.alpha, b.offset - a.offset] for a, b in rows])
+    change[:, 2:] -= TURN * turns(change[:, 2:])
+    if inner:
+        change[0, [0, 2]] = change[0, [1, 3]] = change[-1, [1, 3]] = 0.0
+    lengths, angles = [np.abs(change[:, :2]).max()], [np.abs(change[:, 2:]).max()]
     if not inner:
         for a_end, b_end in ((before.base, after.base), (before.tool, after.tool)):
             lengths += [abs(x) for x in b_end.p - a_end.p]
             angles.append(norm(rotation_log(b_end.R @ a_end.R.T)))
-    return max(lengths), max(angles)
+    return float(max(lengths)), float(max(angles))
 
 
 def _nudged(screw: Screw, length: float, rng: np.random.Generator) -> Screw:

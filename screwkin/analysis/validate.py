@@ -135,7 +135,7 @@ def _repeated(check: Validation, trials: Sequence[Trial]) -> Validation:
     """The verdict with repeated runs, none of which may fall."""
     (row,) = summarised(trials)
     check = replace(check, repeated=row.to_dict(), study=row)
-    reasons = (*_unmeasured(check.run), *reasons_of(check, check.criteria))
+    reasons = tuple(dict.fromkeys((*check.reasons, *reasons_of(check, check.criteria))))
     return replace(check, reasons=reasons, passed=not reasons)
 
 
@@ -176,6 +176,8 @@ def judged(
         reasons=(),
         warnings=_warnings(robot, trajectory, run, slipped, speed),
         engine=run.engine,
+        engine_settings={run.engine: dict(run.settings)},
+        servo=run.servo,
         criteria=criteria,
         fell=run.fallen_at is not None,
         fell_at=run.fallen_at,
@@ -197,8 +199,6 @@ def judged(
         joint_stiffness=dict(springs) if isinstance(springs, Mapping) else None,
         sole_stiffness=compliance.sole_stiffness,
         repeated=None,
-        servo=run.servo,
-        engine_settings={run.engine: dict(run.settings)},
         engines={},
         solver=None,
         undecided=False,

@@ -50,7 +50,7 @@ class Measured:
     ``none``; servo: what moved the joints; joint_stiffness [N m/rad] and sole_stiffness [N/m]: of the
     simulated springs, None if rigid; repeated: runs under other conditions.
     engine: names of all engines, joined by ``+``; numbers are the worst of them. By the engine's name:
-    engine_settings, engines: what each measured, and solver: what finer settings change, None if not tried.
+    engine_settings; engines: what each measured; solver: what finer settings change, None if not tried.
     undecided: the verdict lies within a solver's own scatter; it has not passed.
     """
 
@@ -86,8 +86,8 @@ class Measured:
     joint_stiffness: dict[str, float] | None
     sole_stiffness: float | None
     repeated: dict[str, Any] | None
-    engines: dict[str, Any]
-    solver: dict[str, Any] | None
+    engines: dict[str, dict[str, Any]]
+    solver: dict[str, dict[str, Any]] | None
     undecided: bool
 
     def to_dict(self) -> dict[str, Any]:
@@ -163,16 +163,15 @@ def contradictions(verdict: Verdict) -> tuple[str, ...]:
     lengths = {name: value for name, value in _numbers(verdict) if name not in _SIGNED}
     below = [f"{name} is {value:g}, below 0" for name, value in lengths.items() if value < 0]
     tilted = verdict.max_tilt_deg > np.rad2deg(Criteria().schedule.fallen_tilt)
-    failed = [f"{name} did not pass" for name in verdict.engine.split("+") if not _passed(verdict, name)]
     fallen = [f"tilted by {verdict.max_tilt_deg:.0f} deg, and not fallen"] if tilted else []
-    return tuple(
-        dict.fromkeys((*verdict.reasons, *weaker, *reasons_of(verdict, Criteria()), *below, *failed, *fallen))
-    )
-
-
-def _passed(verdict: Verdict, engine: str) -> bool:
-    alone = verdict.engines.get(engine)
-    return isinstance(alone, Mapping) and alone.get("passed") is True
+    silent = [
+        f"engine {name} has not passed by itself"
+        for name in verdict.engine.split("+")
+        if verdict.engines.get(name, {}).get("passed") is not True
+    ]
+    open_still = ["undecided within the solver's own scatter"] if verdict.undecided else []
+    own_reasons = (*verdict.reasons, *reasons_of(verdict, Criteria()))
+    return tuple(dict.fromkeys((*own_reasons, *weaker, *below, *fallen, *silent, *open_still)))
 
 
 def servo_map_sha256(robot: Robot) -> str:
@@ -199,8 +198,6 @@ def reasons_of(facts: Measured, rule: Criteria) -> tuple[str, ...]:
         reasons.append(f"engine {facts.engine} simulates no forces and confirms nothing; use {PROVING[0]}")
     elif facts.zmp_rms_mm is None or facts.zmp_max_mm is None:
         reasons.append("no ZMP was measured: nothing pressed on the floor")
-    if facts.undecided:
-        reasons.append("undecided: the verdict lies within the solver's own scatter")
     if facts.fell or facts.fell_at is not None:
         when = "" if facts.fell_at is None else f" at {facts.fell_at:.2f} s"
         reasons.append(

@@ -13,7 +13,7 @@ from importlib import import_module
 from io import TextIOWrapper
 from typing import Any, NoReturn
 
-from screwkin.errors import InputError, ScrewkinError, UnknownNameError
+from screwkin.errors import InputError, ScrewkinError, one_of
 
 VERBS = {
     "demo": "A robot walks: table, mechanism, gait, ZMP, simulation, and a report with pictures.",
@@ -109,8 +109,7 @@ def _dispatch(words: Sequence[str]) -> int:
         return 0
     if name.startswith("-"):
         raise InputError(f"unknown option {name}; screwkin --help lists the options and verbs")
-    if name not in VERBS:
-        raise UnknownNameError("verb", name, tuple(VERBS))
+    one_of("verb", name, VERBS)
     import typer
 
     verb = getattr(import_module(f"screwkin.cli.{name}"), name)

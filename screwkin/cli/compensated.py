@@ -11,7 +11,7 @@ import typer
 
 from screwkin.cli.output import aligned
 from screwkin.compliance.springs import joint_stiffness
-from screwkin.errors import InputError, UnknownNameError
+from screwkin.errors import InputError, one_of
 from screwkin.files import make_folder
 from screwkin.gait.compensation import WAYS, Remaining, Way, compensate, convergence
 from screwkin.model.robot import Robot
@@ -63,9 +63,7 @@ def remedy(robot: Robot, way: str | None, passes: int | None, stiffness: float |
             if value is not None:
                 raise InputError(f"{option} is of a compensation; add --compensate {', '.join(WAYS)}")
         return None
-    chosen = next((known for known in WAYS if known == way), None)
-    if chosen is None:
-        raise UnknownNameError("compensation", way, tuple(WAYS))
+    chosen = one_of("compensation", way, tuple(WAYS))
     if passes is not None and passes < 1:
         raise InputError(f"--passes is {passes}; it must be a whole number of at least 1")
     joint_stiffness(robot, stiffness)

@@ -11,7 +11,7 @@ import typer
 from screwkin.analysis.chains import derived_tables
 from screwkin.cli.options import AsJson
 from screwkin.cli.output import print_json, remark
-from screwkin.errors import InputError, UnknownNameError
+from screwkin.errors import InputError, one_of
 from screwkin.files import atomic_write
 from screwkin.model.dh import CONVENTIONS, Convention
 from screwkin.model.dh_csv import dh_text, load_dh
@@ -39,9 +39,7 @@ def convert(
 
     What the target cannot hold is listed. Formulas and mirrored limbs are written out.
     """
-    chosen = next((known for known in CONVENTIONS if known == convention), None)
-    if chosen is None:
-        raise UnknownNameError("convention", convention, CONVENTIONS)
+    chosen = one_of("convention", convention, CONVENTIONS)
     if target.suffix not in FORMATS:
         raise InputError(f"cannot write {target}: OUT must end with {', '.join(FORMATS)}")
     robot, remarks = _read(source)

@@ -11,14 +11,15 @@ import typer
 
 from screwkin.algebra.scalar import Scalar
 from screwkin.analysis.facts import Facts, facts_of
+from screwkin.analysis.readiness import ready
 from screwkin.analysis.validate import Validation
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder
 from screwkin.cli.output import aligned, print_json, remark, silent
+from screwkin.cli.send import played, virtual_bus
 from screwkin.cli.simulation import Wish, simulate_to_files
-from screwkin.cli.virtual_play import played_to_virtual
 from screwkin.cli.walk import chosen_gait, command_of, make_trajectory, write_report
-from screwkin.errors import MissingDependencyError
+from screwkin.errors import MissingDependencyError, SafetyError
 from screwkin.gait.files import default_gait
 from screwkin.gait.record import Gait
 from screwkin.model.library import robot_names
@@ -26,6 +27,9 @@ from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
 from screwkin.report.numbers import balance_numbers, validation_numbers
 from screwkin.report.pictures import Saved, save_servo_pictures
+from screwkin.servo.log import load_log
+from screwkin.servo.player import PlaySettings, describe
+from screwkin.servo.virtual.bus import VirtualBus
 
 Show = Callable[[str], None]
 
@@ -76,7 +80,7 @@ def demo(
             show(
                 "6. The servos, virtual and in simulated time: every frame goes through the gate and the bus"
             )
-            play.update(played_to_virtual(npz, name, folder / "play.npz"))
+            play.update(_played_to_virtual(npz, name, folder / "play.npz"))
             show(aligned([(line,) for line in play["lines"]], "   ") + "\n")
             return save_servo_pictures(account, folder, play["log"]) if "log" in play else ()
 
@@ -153,3 +157,37 @@ def _show_end(show: Show, folder: Path, passed: bool, reasons: tuple[str, ...]) 
         show(f"  {reason}")
     show(f"The report with all pictures: {folder / 'report.html'}")
     show(f"The film: {folder / 'walk.gif'}")
+
+
+def _played_to_virtual(trajectory: Path, robot: str, log: Path) -> dict[str, Any]:
+    """Play a trajectory to virtual servos in simulated time, if it may be sent.
+
+    Returns:
+        lines: what to print; packets: number of packets that the servos heard; servos: the outcome as JSON
+        data, None where nothing was played; log: the record of the play, if there is one.
+    """
+    if not load_robot(robot).servos:
+        return _nothing("The robot's table has no [servos]: nothing to play to.")
+    try:
+        may = ready(trajectory, robot)
+        bus = virtual_bus(may.robot)
+        outcome = played(bus, may, PlaySettings(), log, {"port": "virtual"})
+    except SafetyError as error:
+        return _nothing(f"Refused: {error}")
+    assert isinstance(bus.line, VirtualBus)
+    ids = may.robot.servos["ids"]
+    lines = [
+        f"{outcome.frames} frames in {bus.line.packets} packets, {outcome.late_frames} late; "
+        f"largest tracking error {outcome.max_tracking_error:.3f} rad",
+        describe(outcome, tuple(ids.values())),
+    ]
+    return {
+        "lines": lines,
+        "packets": bus.line.packets,
+        "servos": outcome.to_dict(),
+        "log": load_log(log),
+    }
+
+
+def _nothing(why: str) -> dict[str, Any]:
+    return {"lines": [why], "packets": 0, "servos": None}

@@ -17,7 +17,7 @@ from screwkin.cli.output import aligned, plain, print_json, progress_bar
 from screwkin.files import atomic_write
 from screwkin.papers.bench import Bench
 from screwkin.papers.claims import load_paper
-from screwkin.papers.reproduce import MARKS, Reproduction, check_paper, written
+from screwkin.papers.reproduce import Reproduction, check_paper
 from screwkin.papers.reproduce import reproduce as measured
 
 _TRACED = ("screwkin", "numpy", "scipy", "pybullet")
@@ -90,22 +90,9 @@ def _versions() -> str:
 def _text(result: Reproduction) -> str:
     parts = [result.paper.title]
     for section in result.sections:
-        start = f"{section.section.place}: "
-        rows = [
-            (
-                line.item.removeprefix(start),
-                written(line.paper) or "–",
-                written(line.ours, line.form) or "–",
-                MARKS[line.agrees],
-            )
-            for line in section.lines
-        ]
-        if rows:
-            parts += [
-                "",
-                f"{start}{section.section.title}",
-                aligned([("", "paper", "ours", ""), *rows], "  "),
-            ]
+        if section.lines:
+            cells = [row[:4] for row in section.cells]
+            parts += ["", section.title, aligned([("", "paper", "ours", ""), *cells], "  ")]
     differing = [f"  {line.item}: {line.note}" for line in result.lines if line.agrees is False]
     if differing:
         parts += ["", "where they differ", *differing]

@@ -11,6 +11,7 @@ import typer
 
 from screwkin.analysis.account import account_of, recorded_robot
 from screwkin.analysis.engines import SimulatedCompliance
+from screwkin.analysis.verdict import verdict_of
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, TrajectoryPath
 from screwkin.cli.output import aligned, print_json
@@ -95,7 +96,7 @@ def validate(
     with output_folder(output or beside, "validate", account.robot.name) as folder:
         check = simulate_to_files(account, folder, beside / "validation.json", wish)
     if as_json:
-        print_json({"robot": account.robot.name, **check.to_dict()})
+        print_json({"robot": account.robot.name, **verdict_of(account.robot, loaded, check).to_dict()})
     else:
         print(f"{trajectory}: {account.robot.name}, {loaded.duration:.2f} s in {check.engine}")
         print(aligned(validation_numbers(check), "  "))

@@ -51,6 +51,16 @@ def source(programs: Sequence[Program], include: str | None, real: Real = "doubl
     return "\n".join([f"{above}#include <math.h>\n", _prelude(real), *(_function(p) for p in programs)])
 
 
+def by_pointers(program: Program) -> str:
+    """Definition of ``NAME_rows``: the same function, of pointers to all arrays."""
+    pointers = ", ".join(f"arrays[{k}]" for k in range(len(program.inputs) + len(program.outputs)))
+    return f"""void {program.name}_rows(size_t samples, screwkin_real *const *arrays)
+{{
+    {program.name}(samples, {pointers});
+}}
+"""
+
+
 def _comment(program: Program) -> str:
     def listed(groups: Sequence[Group]) -> str:
         return ", ".join(f"{argument(g)} ({' x '.join(map(str, g.shape)) or '1'})" for g in groups)

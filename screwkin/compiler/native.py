@@ -15,14 +15,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache, partial
 from importlib.metadata import version
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 from screwkin.algebra.arrays import Array
-from screwkin.cache import cache_folder, digest
-from screwkin.compiler import emit_c, series
-from screwkin.compiler.program import Program
+from screwkin.cache import cache_folder, digest, seal, sealed
+from screwkin.compiler import calls, emit_c, series
+from screwkin.compiler.program import Group, Program
 from screwkin.errors import OutputError
 from screwkin.files import atomic_path
 
@@ -48,13 +47,21 @@ def compiler() -> str | None:
 
 @dataclass(frozen=True, eq=False)
 class Native:
-    """A compiled program. Its function takes a number of samples and one pointer for every array.
+    """A compiled program.
 
-    A large batch is shared among ``cores``; default: all that this process may use.
+    A large batch is shared among ``cores``; default: all that this process may use. Where the builtins of
+    ``calls`` are not possible, ctypes calls on one core.
+
+    Attributes:
+        program: what it computes.
+        many: its function of a number of samples and pointers to all arrays, for several samples at once.
+        one: the same for one sample.
+        cores: of the processor.
     """
 
     program: Program
-    function: Any
+    many: Any
+    one: Any
     cores: int | None = None
 
     def __call__(self, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
@@ -66,43 +73,54 @@ class Native:
 
         The arrays must outlive it.
         """
-        return self._call(len(outputs[0]), [*inputs, *outputs])
+        count, arrays = len(outputs[0]), [*inputs, *outputs]
+        addresses = [int(array.ctypes.data) for array in arrays]
+        method = _builtins()
+        if method is not None and len(arrays) <= calls.MOST:
+            plan = self._plan(self.program.outputs, None)
+            return calls.again(method, plan, count, addresses)
+        return partial(
+            self.one if count == 1 else self.many, count, (ctypes.c_void_p * len(arrays))(*addresses)
+        )
 
-    def compute(self, count: int, arrays: Sequence[Array]) -> None:
-        """Fill outputs from inputs, all arrays of any shape that hold samples one after the other."""
-        if count < THREADED_FROM:
-            self.function(count, *map(_address, arrays))
-        else:
-            self._call(count, arrays)()
+    def checked(self, limit: float, allocate: calls.Allocate) -> Callable[..., tuple[Array, ...] | None]:
+        """A call with arrays of any batch.
 
-    def _call(self, count: int, arrays: Sequence[Array]) -> Callable[[], object]:
-        cores = (self.cores or _cores()) if count >= THREADED_FROM else 1
-        if cores == 1:
-            return partial(self.function, count, *map(_address, arrays))
-        bounds = [count * k // cores for k in range(cores + 1)]
-        own, *others = [
-            (stop - start, *(_address(a) + start * (a.nbytes // count) for a in arrays))
-            for start, stop in pairwise(bounds)
-        ]
+        Args:
+            limit: that the last output of every sample, a scalar, must not exceed.
+            allocate: from a batch to C-contiguous arrays (*batch, *shape) for all other outputs.
 
-        def together() -> None:  # ctypes lets go of the interpreter while C computes
-            running = [_pool().submit(self.function, *part) for part in others]
-            self.function(*own)
-            for part in running:
-                part.result()
+        Returns:
+            A function from the inputs to these outputs; None if an input is not a C-contiguous float64 NumPy
+            array of the batch that all have, if a sample exceeds the limit, and where there is no builtin.
+        """
+        method, outputs = _builtins(), self.program.outputs[:-1]
+        if method is None or len(self.program.inputs) + len(outputs) > calls.MOST:
+            return lambda *arrays: None
+        return calls.checked(method, self._plan(outputs, limit), outputs, allocate)
 
-        return together
-
-
-def _address(array: Any) -> int:
-    """Where an array's numbers lie. The buffer tells in a third of the time that NumPy's attribute takes."""
-    try:
-        return _addressof(_from_buffer(array))
-    except (TypeError, ValueError):  # read-only, or empty
-        return int(array.ctypes.data)
+    def _plan(self, outputs: Sequence[Group], limit: float | None) -> bytes:
+        many, one = (_addressof(function) for function in (self.many, self.one))
+        cores = self.cores or _cores()
+        inputs = self.program.inputs
+        return calls.plan(many, one, inputs, outputs, cores=cores, shared_from=THREADED_FROM, limit=limit)
 
 
-_addressof, _from_buffer = ctypes.addressof, ctypes.c_char.from_buffer
+def _addressof(function: Any) -> int:
+    address = ctypes.cast(function, ctypes.c_void_p).value
+    assert address is not None
+    return address
+
+
+@cache
+def _builtins() -> Any:
+    """The function that tells where a builtin's definition lies; None where there are no builtins."""
+    if not calls.possible():
+        return None
+    method = shared(calls.key(), calls.source, "screwkin_method", calls.flags())
+    if method is not None:
+        method.restype, method.argtypes = ctypes.c_void_p, [ctypes.c_int]
+    return method
 
 
 @cache
@@ -110,23 +128,19 @@ def _cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-@cache
-def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(_cores(), thread_name_prefix="screwkin")
-
-
-if hasattr(os, "register_at_fork"):
-    os.register_at_fork(after_in_child=_pool.cache_clear)  # a forked child has none of its threads
-
-
 def compiled(program: Program) -> Native | None:
     """The program as machine code, from the cache or compiled now; None if that is not possible here."""
-    function = shared(program.digest, lambda: _source(program), program.name)
-    if function is None:
-        return None
-    function.restype = None
-    function.argtypes = [ctypes.c_size_t] + [ctypes.c_void_p] * (len(program.inputs) + len(program.outputs))
-    return Native(program, function)
+    with ThreadPoolExecutor(2) as pool:
+        both = pool.map(partial(_rows, program), ((), ("-DSCREWKIN_SCALAR",)))
+    many, one = both
+    return None if many is None or one is None else Native(program, many, one)
+
+
+def _rows(program: Program, flags: tuple[str, ...]) -> Any:
+    function = shared(program.digest, lambda: _source(program), f"{program.name}_rows", flags)
+    if function is not None:
+        function.restype, function.argtypes = None, [ctypes.c_size_t, ctypes.POINTER(ctypes.c_void_p)]
+    return function
 
 
 def shared(key: str, text: Callable[[], str], name: str, flags: tuple[str, ...] = ()) -> Any:
@@ -141,11 +155,12 @@ def shared(key: str, text: Callable[[], str], name: str, flags: tuple[str, ...] 
     cc = compiler()
     if cc is None:
         return None
-    library = _library(key, cc, flags)
+    library = cache_folder() / f"{_name(key, cc, flags)}.so"
     try:
-        if not os.path.exists(library):
-            _build(text(), cc, flags, Path(library))
-        return ctypes.CDLL(library)[name]
+        if not sealed(library):
+            _build(text(), cc, flags, library)
+            seal(library)
+        return ctypes.CDLL(str(library))[name]
     except (OSError, OutputError, AttributeError, subprocess.SubprocessError):
         return None
 
@@ -153,7 +168,7 @@ def shared(key: str, text: Callable[[], str], name: str, flags: tuple[str, ...] 
 def _source(program: Program) -> str:
     """One file: the header's text in front of the definitions."""
     header = emit_c.header([program], "SCREWKIN_KERNEL_H", "double")
-    return header + emit_c.source([program], None)
+    return "\n".join([header + emit_c.source([program], None), emit_c.by_pointers(program)])
 
 
 @cache
@@ -175,10 +190,6 @@ def _machine() -> str:
         lines = []
     flags = next((line for line in lines if line.startswith(("flags", "Features"))), "")
     return f"{platform.machine()} {platform.processor()} {flags}"
-
-
-def _library(key: str, cc: str, flags: tuple[str, ...]) -> str:
-    return f"{cache_folder()}/{_name(key, cc, flags)}.so"
 
 
 @cache

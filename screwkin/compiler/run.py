@@ -73,22 +73,25 @@ def as_rows(array: Array, batch: tuple[int, ...], shape: tuple[int, ...]) -> Arr
     return rows if rows.flags.c_contiguous else np.ascontiguousarray(rows)
 
 
-FEW = 250
-"""Operations of all samples below which even a prepared program runs as Python: calling C takes as long."""
 _PREPARED = "prepared"
 
 
 def chosen_path(program: Program, count: int) -> Way:
     """The path that ``run`` takes: a static rule of the samples, and of what was prepared."""
-    if program.memo.get(_PREPARED) and count * program.operations >= FEW:
+    if is_prepared(program):
         return "C"
     return "python" if count <= PYTHON_UP_TO else "numpy"
+
+
+def is_prepared(program: Program) -> bool:
+    """True if machine code was asked for and is there."""
+    return bool(program.memo.get(_PREPARED))
 
 
 def compile_program(program: Program) -> bool:
     """Compile a program: from now on ``run`` takes machine code. False where there is no compiler."""
     program.memo[_PREPARED] = machine_code(program) is not None
-    return bool(program.memo[_PREPARED])
+    return is_prepared(program)
 
 
 def large_batches() -> Way:

@@ -13,11 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from screwkin.algebra.arrays import Array
 from screwkin.compiler import run
 from screwkin.compiler.program import Program, Recorder
 from screwkin.compiler.records import identifier
-from screwkin.errors import InputError
+from screwkin.errors import InputError, expect
 from screwkin.export.quantities import ALGORITHMS, QUANTITIES, choices_of, quantity_of, subject_of
 from screwkin.kinematics.arrays import Argument
 from screwkin.kinematics.door import Door
@@ -134,6 +133,7 @@ class Bound:
         self._door = Door(recorder, list(arguments.values())).prepare()
         self._reads = [(sources[a.name], a.of) for a in self._door.arguments]
         self._needs = {source for source, _ in self._reads} - set(STATE)
+        self._values, self._compute = _reader(self._reads), self._door.by_machine
         self._results = namedtuple("Results", names) if len(names) > 1 else None
 
     @property
@@ -148,8 +148,15 @@ class Bound:
             ShapeError: a wrong shape, NaN or infinity, a base pose that is not rigid.
             InputError: an array is missing or not an argument of the quantities.
         """
-        found = self._door(self._read(state, arrays))
-        return self._results(*found) if self._results else found[0]
+        try:
+            values = self._values(state, **arrays)
+        except (TypeError, KeyError, AttributeError):
+            self._refuse(state, arrays)
+            raise
+        found: Sequence[Any] | None = self._compute(*values)
+        if found is None:
+            found = self._door(values)
+        return tuple.__new__(self._results, found) if self._results else found[0]
 
     def in_place(self, state: State, **arrays: Any) -> tuple[Callable[[], object], Any]:
         """For the innermost loop: a call that reads these very arrays anew each time, and checks nothing.
@@ -161,7 +168,11 @@ class Bound:
         Returns:
             The call, without arguments, and the results, which it fills.
         """
-        values = self._read(state, arrays)
+        try:
+            values = self._values(state, **arrays)
+        except (TypeError, KeyError, AttributeError):
+            self._refuse(state, arrays)
+            raise
         door = self._door
         batch = door.batch(values)
         if batch is None:
@@ -182,17 +193,27 @@ class Bound:
 
         return call, self._results(*results) if self._results else results[0]
 
-    def _read(self, state: State, arrays: Mapping[str, Any]) -> list[Array]:
-        if arrays.keys() != self._needs:
-            missing, foreign = sorted(self._needs - arrays.keys()), sorted(arrays.keys() - self._needs)
-            raise InputError(
-                "; ".join(
-                    [f"missing: {', '.join(missing)}"] * bool(missing)
-                    + [f"not an argument: {', '.join(foreign)}"] * bool(foreign)
-                )
-            )
-        values = []
+    def _refuse(self, state: Any, arrays: Mapping[str, Any]) -> None:
+        """Say why arguments cannot be read."""
+        expect(state, State, "state", "State(T_world_base, q)")
+        missing, foreign = sorted(self._needs - arrays.keys()), sorted(arrays.keys() - self._needs)
+        reasons = [f"missing: {', '.join(missing)}"] * bool(missing)
+        reasons += [f"not an argument: {', '.join(foreign)}"] * bool(foreign)
         for source, of in self._reads:
-            value = getattr(state, source) if source in STATE else arrays[source]
-            values.append(value[of] if of else value)
-        return values
+            value = arrays.get(source)
+            if of and source in arrays and not (isinstance(value, Mapping) and of in value):
+                reasons.append(f"{source} lacks {of}")
+        if reasons:
+            raise InputError("; ".join(reasons))
+
+
+def _reader(reads: Sequence[tuple[str, str]]) -> Callable[..., tuple[Any, ...]]:
+    """A function from a state and arguments by name to arrays, each ``(argument, key in it or "")``."""
+    needs = sorted({source for source, _ in reads} - set(STATE))
+    values = [
+        f"state.{source}" if source in STATE else f"{source}[{of!r}]" if of else source
+        for source, of in reads
+    ]
+    arguments = ", ".join(["state", *(["*", *needs] if needs else [])])
+    read: Callable[..., tuple[Any, ...]] = eval(f"lambda {arguments}: ({''.join(v + ', ' for v in values)})")  # noqa: S307
+    return read

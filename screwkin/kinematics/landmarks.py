@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from screwkin.algebra.screws import Screw
-from screwkin.algebra.se3 import IDENTITY, Pose, Rotation, Vector, cross, dot, map_scalars, norm
+from screwkin.algebra.se3 import IDENTITY, ZERO, Pose, Rotation, Vector, cross, dot, map_scalars, norm
 from screwkin.errors import InputError
 from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.model.robot import Joint, Limb, Robot
@@ -93,10 +93,7 @@ def _root(axes: Sequence[Screw], tip: Vector) -> Vector:
 
 
 def _mean(vectors: Sequence[Vector]) -> Vector:
-    total = vectors[0]
-    for vector in vectors[1:]:
-        total = total + vector
-    return total / len(vectors)
+    return sum(vectors, ZERO) / len(vectors)
 
 
 def _floats(v: Vector) -> Vector:

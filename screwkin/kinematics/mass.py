@@ -15,10 +15,8 @@ Placements = Sequence[Pose | Displacement]
 
 def first_moment(robot: Robot, displacements: Placements) -> Vector:
     """Sum of mass times CoM position over the links [kg m]."""
-    total = ZERO
-    for link, D in zip(robot.links, displacements, strict=True):
-        total = total + (D @ link.com) * link.mass
-    return total
+    pairs = zip(robot.links, displacements, strict=True)
+    return sum(((D @ link.com) * link.mass for link, D in pairs), ZERO)
 
 
 def mass_center(robot: Robot, displacements: Placements) -> Vector:

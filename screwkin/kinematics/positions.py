@@ -46,7 +46,7 @@ def chain_jacobian(screws: Sequence[Screw], thetas: Sequence[Scalar]) -> list[Tw
 def link_displacements(robot: Robot, q: Sequence[Scalar], base: Displacement = AT_REST) -> list[Displacement]:
     """Displacement of every link from the zero pose, in the order of ``robot.links``.
 
-    Told in the base frame; or in the frame to which ``base`` displaces it, all at the price of one.
+    Expressed in the base frame; or in the frame to which ``base`` displaces it, at the cost of one product.
     """
     carried = {robot.base_link: base}
     for i in robot.traversal:

@@ -25,8 +25,8 @@ def nearest_poses(T: Array) -> tuple[Array, Array]:
 
     The distance is that of ``poses``; rotations are exact to the last digit.
     """
-    found = run(poses(True), {"T": T})
-    return found["deviation"][..., 0], found["pose"]
+    result = run(poses(True), {"T": T})
+    return result["deviation"][..., 0], result["pose"]
 
 
 @cache
@@ -48,13 +48,19 @@ def poses(exact: bool) -> Program:
 
 def deviation(T: Sequence[Scalar]) -> Scalar:
     """How far sixteen scalars, row by row, are from a rigid pose: see ``poses``."""
-    R = Rotation(*(Vector(*T[c:12:4]) for c in range(3)))
-    gram = _gram(R)
-    entries = [gram[0] - 1, gram[1] - 1, gram[2] - 1, *gram[3:], *T[12:15], T[15] - 1]
+    *entries, handed = deviations(T)
     worst: Scalar = 0.0
     for entry in map(abs_, entries):
         worst = where(entry > worst, entry, worst)
-    return where(dot(R.x, cross(R.y, R.z)) > 0.0, worst, math.inf)
+    return where(handed > -1.0, worst, math.inf)
+
+
+def deviations(T: Sequence[Scalar]) -> list[Scalar]:
+    """What is 0 of a rigid pose: R^T R - 1, the last row's difference from 0 0 0 1, and det R - 1."""
+    R = Rotation(*(Vector(*T[c:12:4]) for c in range(3)))
+    gram = _gram(R)
+    ones = [gram[0] - 1, gram[1] - 1, gram[2] - 1]
+    return [*ones, *gram[3:], *T[12:15], T[15] - 1, dot(R.x, cross(R.y, R.z)) - 1]
 
 
 def _gram(R: Rotation) -> list[Scalar]:

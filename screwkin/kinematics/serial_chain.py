@@ -174,7 +174,7 @@ def nearest_points(screws: Sequence[Screw], tip: Vector) -> tuple[Screw, ...]:
 
     These points do not depend on joint positions, nor on which points a table names.
     """
-    near, found = tip, list[Screw]()
+    near, through = tip, list[Screw]()
     for screw in reversed(screws):
         if any(is_symbolic(x) for x in leaves(screw.s0 - near)):
             near = screw.s0
@@ -182,8 +182,8 @@ def nearest_points(screws: Sequence[Screw], tip: Vector) -> tuple[Screw, ...]:
             pass
         else:
             near = _slid(screw, float(dot(screw.s, near - screw.s0)))
-        found.insert(0, Screw(screw.s, near, screw.pitch))
-    return tuple(found)
+        through.insert(0, Screw(screw.s, near, screw.pitch))
+    return tuple(through)
 
 
 def _slid(screw: Screw, along: float) -> Vector:

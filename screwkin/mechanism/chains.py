@@ -65,7 +65,7 @@ def rotations(chain: Sequence[str]) -> list[str]:
 
 
 def held_pose(chain: Sequence[str], home: Pose) -> Pose:
-    """What the couplings that a chain lacks hold: the body's pose when the chain's coordinates are zero.
+    """The body's pose when the chain's coordinates are zero: what couplings that are not in the chain hold.
 
     ``home`` is a pose of the body that the chain passes through; a chain of space holds nothing.
     """

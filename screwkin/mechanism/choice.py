@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.algebra.se3 import UNTURNED, Rotation, norm, rotation_log
-from screwkin.errors import InputError, SingularError, UnknownNameError, expect
+from screwkin.algebra.se3 import UNTURNED, norm, rotation_log
+from screwkin.errors import InputError, SingularError, expect, one_of
 from screwkin.kinematics.positions import link_displacements
-from screwkin.mechanism.mechanism import Mechanism, coupling_graph, virtual_chains
+from screwkin.mechanism.mechanism import Mechanism, unchosen
 from screwkin.mechanism.network import coupling_twists, network_of_twists
 from screwkin.mechanism.scaling import characteristic_length, referenced
 from screwkin.model.robot import Robot
@@ -28,12 +28,12 @@ CLOSED = 1e-7
 """Largest gap of a closure, in sizes of the robot and in rad, at which ranks are decided."""
 
 
-def rank(N: Array) -> int:
-    """Numerical rank of a length-normalised matrix."""
-    if min(N.shape) == 0:
-        return 0
+def rank(N: Array) -> Any:
+    """Numerical rank (...,) of length-normalised matrices (..., rows, columns)."""
+    if min(N.shape[-2:]) == 0:
+        return np.zeros(N.shape[:-2], dtype=int)
     values = np.linalg.svd(N, compute_uv=False)
-    return int((values > RANK_TOLERANCE * max(values[0], 1.0)).sum())
+    return (values > RANK_TOLERANCE * np.maximum(values[..., :1], 1.0)).sum(axis=-1)
 
 
 def independent(N: Array, order: Sequence[int]) -> list[int]:
@@ -50,11 +50,6 @@ def independent(N: Array, order: Sequence[int]) -> list[int]:
             basis.append(rest / np.linalg.norm(rest))
             chosen.append(column)
     return chosen
-
-
-def network_at(mechanism: Mechanism, q: Sequence[float], R: Rotation = UNTURNED) -> Array:
-    """Length-normalised N at one posture, every circuit at its reference point."""
-    return referenced(mechanism, network_of_twists(mechanism, coupling_twists(mechanism, R, list(q))))
 
 
 def preference(mechanism: Mechanism) -> list[int]:
@@ -110,12 +105,10 @@ def closed_mechanism(robot: Robot, primary: Sequence[str] | None = None) -> Mech
     Source: Davies (1981); paper A, eq. 9-11, 15.
     """
     expect(robot, Robot, "robot", 'load_robot("NAME")')
-    chains = virtual_chains(robot)
-    graph = coupling_graph(robot, chains)
-    bare = Mechanism(robot, chains, graph, (), tuple(name for name, _, _ in graph.edges), 0)
-    _check_closed(robot, reference_posture(robot))
-    N = network_at(bare, reference_posture(robot))
-    mobility = len(bare.couplings) - rank(N)
+    bare, q = unchosen(robot), reference_posture(robot)
+    _check_closed(robot, q)
+    N = referenced(bare, network_of_twists(bare, coupling_twists(bare, UNTURNED, q)))
+    mobility = len(bare.couplings) - int(rank(N))
     if primary is None:
         columns = set(independent(N, preference(bare)))
         primary = tuple(name for i, name in enumerate(bare.couplings) if i not in columns)
@@ -136,9 +129,7 @@ def _wanted(bare: Mechanism, primary: Sequence[str]) -> set[str]:
         raise InputError(f"primary is the text {primary!r}; give a list of couplings, as [{primary!r}]")
     wanted: set[str] = set()
     for name in primary:
-        if name not in bare.position:
-            raise UnknownNameError("coupling", name, bare.couplings)
-        if name in wanted:
+        if one_of("coupling", name, bare.couplings) in wanted:
             raise InputError(f"primary names {name} twice; give every coupling once")
         wanted.add(name)
     return wanted
@@ -192,6 +183,4 @@ def _check(mechanism: Mechanism, N: Array) -> None:
 
 def mobility_at(mechanism: Mechanism, N: Array) -> Any:
     """Mobility (...,) at given states: couplings less the rank of N (..., 6 circuits, couplings)."""
-    values = np.linalg.svd(referenced(mechanism, N), compute_uv=False)
-    ranks = (values > RANK_TOLERANCE * np.maximum(values[..., :1], 1.0)).sum(axis=-1)
-    return len(mechanism.couplings) - ranks
+    return len(mechanism.couplings) - rank(referenced(mechanism, N))

@@ -16,8 +16,6 @@ from screwkin.algebra.newton import newton
 from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.screws import at
 from screwkin.algebra.se3 import (
-    IDENTITY,
-    UNTURNED,
     ZERO,
     Pose,
     Twist,
@@ -26,12 +24,12 @@ from screwkin.algebra.se3 import (
     rotation_log,
     unstack,
 )
-from screwkin.errors import InputError, NoSolutionError, UnknownNameError
+from screwkin.errors import InputError, NoSolutionError, one_of
 from screwkin.kinematics import limits
 from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.kinematics.status import CLOSED, SINGULAR, Status
 from screwkin.mechanism.chains import chain_coordinates, chain_pose
-from screwkin.mechanism.mechanism import Mechanism, coupling_graph, virtual_chains
+from screwkin.mechanism.mechanism import Mechanism, unchosen
 from screwkin.mechanism.network import coupling_twists, network_of_twists
 from screwkin.mechanism.scaling import characteristic_length
 from screwkin.model.robot import Robot
@@ -120,14 +118,12 @@ def close_loops(mechanism: Mechanism, guess: State, imposed: Mapping[str, Array]
     Example:
         >>> import screwkin as sk
         >>> mechanism = sk.closed_mechanism(sk.load_robot("linkages/four-bar"))
-        >>> found = sk.close_loops(mechanism, sk.home(mechanism.robot), {"crank": 0.9})
-        >>> int(found.status), round(float(found.state.q[0]), 12)
+        >>> closed = sk.close_loops(mechanism, sk.home(mechanism.robot), {"crank": 0.9})
+        >>> int(closed.status), round(float(closed.state.q[0]), 12)
         (0, 0.9)
     """
     for name in imposed:
-        if name not in mechanism.position:
-            raise UnknownNameError("coupling", name, mechanism.couplings)
-        if name in mechanism.secondary:
+        if one_of("coupling", name, mechanism.couplings) in mechanism.secondary:
             raise InputError(f"{name} is secondary and follows; impose primary couplings only")
     T, q = np.asarray(guess.T_world_base, dtype=float), np.asarray(guess.q, dtype=float)
     values = {name: np.asarray(value, dtype=float) for name, value in imposed.items()}
@@ -158,7 +154,7 @@ def close_loops(mechanism: Mechanism, guess: State, imposed: Mapping[str, Array]
     result = newton(residual, x[:, columns])
     x[:, columns] = result.x
     _, Ns = residual(result.x, np.arange(count))
-    sigma = np.linalg.svd(Ns, compute_uv=False)[:, len(columns) - 1]
+    sigma = np.linalg.svd(Ns, compute_uv=False)[:, : len(columns)].min(axis=-1)
     closed = result.residual * max(1.0, length) <= CLOSED
     status = np.where(
         closed, np.where(sigma < SINGULAR, Status.SINGULAR, Status.CONVERGED), Status.UNREACHABLE
@@ -183,28 +179,13 @@ def nearest_closed(robot: Robot, q: Array) -> Array:
     Raises:
         NoSolutionError: Newton's method finds none from there; the message names the residual.
     """
-    single = replace(robot, limbs=(), soles=())
-    chains = virtual_chains(single)
-    graph = coupling_graph(single, chains)
-    mechanism = Mechanism(single, chains, graph, (), tuple(name for name, _, _ in graph.edges), 0)
-    order = [mechanism.position[name] for name in robot.joint_names]
-    length = characteristic_length(robot)
-    scale = np.tile([1.0, 1.0, 1.0, 1 / length, 1 / length, 1 / length], len(mechanism.closings))
-
-    def residual(joints: Array, samples: Array) -> tuple[Array, Array]:
-        full = np.zeros((len(joints), len(mechanism.couplings)))
-        full[:, order] = joints
-        missing = as_array(closure_errors(mechanism, unstack(full), IDENTITY), (len(joints),))
-        twists = coupling_twists(mechanism, UNTURNED, unstack(joints))
-        N = network_of_twists(mechanism, twists, (len(joints),), mechanism.closing_matrix)
-        return missing.reshape(len(joints), -1) * scale, N[..., order] * scale[:, None]
-
-    result = newton(residual, np.asarray(q, dtype=float)[None])
-    if result.residual[0] > CLOSED:
+    mechanism = unchosen(replace(robot, limbs=(), soles=()))
+    solution = close_loops(mechanism, State(np.eye(4), q), {})
+    if solution.residual > CLOSED:
         raise NoSolutionError(
-            f"{robot.name}: no closed posture near this one; {result.residual[0]:.3g} is left"
+            f"{robot.name}: no closed posture near this one; {float(solution.residual):.3g} is left"
         )
-    return result.x[0]
+    return np.asarray(solution.state.q)
 
 
 def _beyond_limits(mechanism: Mechanism, x: Array) -> Array:

@@ -6,11 +6,10 @@ Pure integer work. Source: Davies (1981), after Kirchhoff; paper A, section 2.4 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-Integers = np.ndarray[Any, np.dtype[np.int64]]
+from screwkin.algebra.arrays import Integers
 
 
 @dataclass(frozen=True)

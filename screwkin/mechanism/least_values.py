@@ -8,15 +8,16 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.scalar import Scalar
-from screwkin.algebra.screws import Displacement, Screw, at, carry
-from screwkin.algebra.se3 import ZERO, Pose, Rotation, Twist, Vector
+from screwkin.algebra.screws import Displacement, Screw, at
+from screwkin.algebra.se3 import ZERO, Pose, Rotation, Twist
 from screwkin.algebra.singular_values import TRUSTED, least_singular_value
 from screwkin.compiler.program import Program, Recorder, kept
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.compiler.run import common_batch, run
 from screwkin.kinematics.positions import joint_screws, link_displacements, pose_in_base
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.chains import chain_twists
-from screwkin.mechanism.limb_motion import seen_from
+from screwkin.mechanism.limb_motion import seen_screws
 from screwkin.mechanism.mechanism import Mechanism, mechanism_of
 from screwkin.mechanism.network import coupling_twists
 from screwkin.mechanism.rates import block_rows, flat, network_of
@@ -50,10 +51,10 @@ def least_values(mechanism: Mechanism, T_world_base: Array, q: Array) -> Array:
         program = block_values(mechanism.robot, mechanism.primary, mechanism.secondary)
         result = run(program, {"T_world_base": T, "q": q})
         least[:, by_formula] = result["least"]
-        doubtful = np.flatnonzero(~(result["error"] <= TRUSTED).all(axis=1))
-        if len(doubtful):
-            N = network_of(mechanism, T[doubtful], q[doubtful])
-            least[doubtful[:, None], by_formula] = network_values(mechanism, N, by_formula)
+        uncertified = np.flatnonzero(~(result["error"] <= TRUSTED).all(axis=1))
+        if len(uncertified):
+            N = network_of(mechanism, T[uncertified], q[uncertified])
+            least[uncertified[:, None], by_formula] = network_values(mechanism, N, by_formula)
     if others and len(q):
         least[:, others] = network_values(mechanism, network_of(mechanism, T, q), others)
     return least.reshape(*batch, least.shape[-1])
@@ -120,27 +121,14 @@ def _at_reference(
     assert tip.limb is not None
     path = robot.path_to(tip.limb.link)
     if [robot.joint_names[i] for i in path] == list(names):
-        screws = [robot.joints[i].screw for i in path]
-        return dict(zip(names, _limb_at_tip(screws, [q[i] for i in path], tip.limb.frame.p), strict=True))
+        # A common rotation changes no singular value; before the last joint most components are 0.
+        chain = SerialChain.of(robot, tip.limb.name)
+        screws = seen_screws(chain, None, [q[i] for i in path], len(path) - 1)
+        return dict(zip(names, screws, strict=True))
     twists = dict(zip(mechanism.couplings, coupling_twists(mechanism, R, q), strict=True))
     D = link_displacements(robot, q, Displacement(R, ZERO, ZERO))
     body, held = pose_in_base(robot, D, tip.name), mechanism.held(tip, Pose(R, ZERO))
     here = {name: at(body.p, twist) for name, twist in twists.items()}
     joints = zip(robot.joint_names, joint_screws(robot, D), strict=True)
-    here |= {name: _twist(screw, body.p) for name, screw in joints}
+    here |= {name: Screw(s.s, s.s0 - body.p, s.pitch).twist for name, s in joints}
     return here | dict(zip(tip.names, chain_twists(tip.couplings, body.R @ held.R.T, ZERO), strict=True))
-
-
-def _limb_at_tip(screws: Sequence[Screw], q: Sequence[Scalar], tip: Vector) -> list[Twist]:
-    """Screws of a limb at its tip, in the axes of the link before the last joint.
-
-    A common rotation changes no singular value, and there most components are 0.
-    """
-    seen = seen_from(screws, q, len(screws) - 1)
-    here = seen[-1] @ tip
-    return [_twist(carry(D, screw), here) for D, screw in zip(seen[:-1], screws, strict=True)]
-
-
-def _twist(screw: Screw, point: Vector) -> Twist:
-    """The screw at a point: so expressed, what passes through the point has no velocity."""
-    return Screw(screw.s, screw.s0 - point, screw.pitch).twist

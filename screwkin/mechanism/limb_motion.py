@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from screwkin.algebra.scalar import Scalar
-from screwkin.algebra.screws import AT_REST, Displacement, Screw, advance, carry
+from screwkin.algebra.screws import AT_REST, Displacement, Screw, advance, carry, turn
 from screwkin.algebra.se3 import Pose, Rotation, Twist, Vector, bracket, cross
 from screwkin.kinematics.positions import pose_in_base
 from screwkin.kinematics.serial_chain import SerialChain
@@ -64,8 +64,7 @@ class LimbMotion:
         return cls(path, split, chain.length, tip, point, carried[links[joints]].R, twists)
 
     def _turned(self, omega: Vector, v: Vector) -> Twist:
-        back = self.axes.T
-        return Twist(back @ omega, back @ v)
+        return turn(self.axes.T, Twist(omega, v))
 
     def _solved(self, wanted: Twist) -> tuple[list[Scalar], Scalar]:
         if len(self.path) == 6:

@@ -19,7 +19,7 @@ from screwkin.algebra.scalar import Scalar, minus, times
 from screwkin.algebra.se3 import Twist, Vector, dot
 from screwkin.kinematics.axis_geometry import meeting, parallel
 from screwkin.kinematics.serial_chain import SerialChain
-from screwkin.mechanism.scaling import levers, skeleton, weighed
+from screwkin.mechanism.scaling import weighed
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ def split_of(chain: SerialChain) -> Split | None:
             return Split("meeting", k, point)
     for k in range(4):
         if parallel(chain, k, k + 1) and parallel(chain, k + 1, k + 2):
-            return Split("parallel", k, skeleton(chain.screws, chain.tip.p)[k])
+            return Split("parallel", k, chain.screws[k].s0)
     return None
 
 
@@ -93,14 +93,3 @@ def pose_rates(
 def point_rates(twists: Sequence[Twist], wanted: Vector, length: float) -> tuple[list[Scalar], Scalar]:
     """Rates of three joints, screws expressed at a point, that move it as wanted; and their determinant."""
     return cramer([t.v / length for t in twists], wanted / length)
-
-
-def doubtful(chain: SerialChain, tolerance: float) -> float:
-    """Determinant below which a limb's least singular value at its tip may lie below the tolerance.
-
-    The product of the other singular values is at most that of a matrix with its Frobenius norm shared
-    equally; the norm is bounded by how far from the tip the axes can be.
-    """
-    norms = [1 + (reach / chain.length) ** 2 for reach in levers(chain.screws, chain.tip.p)]
-    n = len(norms)
-    return float(tolerance * (sum(norms) / (n - 1)) ** ((n - 1) / 2))

@@ -7,16 +7,17 @@ joints of no limb. Virtual chains lead from the floor to the waist (floating bas
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from screwkin.algebra.arrays import Integers
 from screwkin.algebra.pattern import components
 from screwkin.algebra.se3 import IDENTITY, Pose
 from screwkin.mechanism import graph as graphs
 from screwkin.mechanism.chains import SPATIAL, check_chain, held_pose
-from screwkin.mechanism.graph import CouplingGraph, Integers
+from screwkin.mechanism.graph import CouplingGraph
 from screwkin.model.display import html_table, listing
 from screwkin.model.robot import Limb, Robot
 
@@ -212,7 +213,13 @@ def coupling_graph(robot: Robot, chains: tuple[VirtualChain, ...]) -> CouplingGr
     return CouplingGraph(tuple(v for v in vertices if v in used), tuple(edges))
 
 
+def unchosen(robot: Robot) -> Mechanism:
+    """The mechanism of a robot before any choice: all its couplings are secondary."""
+    chains = virtual_chains(robot)
+    graph = coupling_graph(robot, chains)
+    return Mechanism(robot, chains, graph, (), tuple(name for name, _, _ in graph.edges), 0)
+
+
 def mechanism_of(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, ...]) -> Mechanism:
     """The mechanism of a robot with a choice that has been checked."""
-    chains = virtual_chains(robot)
-    return Mechanism(robot, chains, coupling_graph(robot, chains), primary, secondary, len(primary))
+    return replace(unchosen(robot), primary=primary, secondary=secondary, mobility=len(primary))

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from screwkin.algebra.arrays import Integers
 from screwkin.algebra.scalar import Scalar, is_jax
 from screwkin.algebra.screws import at
 from screwkin.algebra.se3 import NO_TWIST, ZERO, Pose, Rotation, Twist, Vector, as_array, bracket
@@ -18,7 +19,6 @@ from screwkin.kinematics.formula import formula
 from screwkin.kinematics.kinds import Columns, Joints
 from screwkin.kinematics.positions import joint_twists, link_displacements, pose_in_base
 from screwkin.mechanism.chains import chain_twists
-from screwkin.mechanism.graph import Integers
 from screwkin.mechanism.mechanism import Mechanism
 
 
@@ -46,21 +46,17 @@ def coupling_twists(
 
 
 @formula
-def coupling_screws(
-    mechanism: Mechanism, T_world_base: Pose, q: Joints, point: Vector | None = None
-) -> Columns:
+def coupling_screws(mechanism: Mechanism, T_world_base: Pose, q: Joints) -> Columns:
     """Normalised screws of all couplings of the closed mechanism, world axes.
 
     Args:
         mechanism: from ``closed_mechanism``.
         state:
-        point: world point [m] at which they are expressed; default: the base origin.
 
     Returns:
-        S (..., 6, couplings), columns [omega; v at the point].
+        S (..., 6, couplings), columns [omega; v at the base origin].
     """
-    at_point = ZERO if point is None else point - T_world_base.p
-    return coupling_twists(mechanism, T_world_base.R, q, at_point)
+    return coupling_twists(mechanism, T_world_base.R, q)
 
 
 def network_blocks(mechanism: Mechanism, twists: Sequence[Twist]) -> list[list[Twist]]:
@@ -96,7 +92,7 @@ def assembled(mechanism: Mechanism, S: Any, circuits: Integers | None = None) ->
 def twist_rates(mechanism: Mechanism, twists: Sequence[Twist], rates: Sequence[Scalar]) -> list[Twist]:
     """Time derivative of every coupling's screw when all couplings move, at the fixed point.
 
-    The link that bears a screw carries it: the derivative is the bracket of that link's twist with it.
+    The link on which a screw stands carries it: the derivative is the bracket of that link's twist with it.
     """
     moving: dict[str, Twist] = {mechanism.links[0]: NO_TWIST}
     derivative: dict[int, Twist] = {}

@@ -97,9 +97,9 @@ def solve_rates(mechanism: Mechanism, T_world_base: Array, q: Array, primary: Ar
             rows[samples[:, None], own] = solution.values[:, own]
             marks[samples, k] = solution.singular[:, k]
 
-    doubtful = np.flatnonzero(~certified.all(axis=-1))
-    if len(doubtful):
-        solve(doubtful, by_formula)
+    uncertified = np.flatnonzero(~certified.all(axis=-1))
+    if len(uncertified):
+        solve(uncertified, by_formula)
     others = [k for k in range(len(mechanism.blocks)) if k not in by_formula]
     if others and len(q):
         solve(np.arange(len(q)), others)
@@ -123,7 +123,7 @@ def secondary_accelerations(
     """
     batch = common_batch((T_world_base, q, rates, primary), (2, 1, 1, 1))
     xp = numpy_of(T_world_base, q, rates, primary)
-    S = screws_of(mechanism, T_world_base, q)
+    S = coupling_screws(mechanism, State(T_world_base, q))
     S = xp.broadcast_to(S, (*batch, *S.shape[-2:]))
     rates = xp.broadcast_to(rates, (*batch, rates.shape[-1]))
     scalars = unstack(rates)
@@ -135,14 +135,9 @@ def secondary_accelerations(
     return _by_singular_values(mechanism, assembled(mechanism, S), primary, known=coriolis)
 
 
-def screws_of(mechanism: Mechanism, T_world_base: Array, q: Array) -> Array:
-    """Screws of all couplings (..., 6, couplings), at the base origin, world axes."""
-    return coupling_screws(mechanism, State(T_world_base, q))
-
-
 def network_of(mechanism: Mechanism, T_world_base: Array, q: Array) -> Array:
     """Network matrix (..., 6 circuits, couplings) of checked arrays, formed at the base origin."""
-    N: Array = assembled(mechanism, screws_of(mechanism, T_world_base, q))
+    N: Array = assembled(mechanism, coupling_screws(mechanism, State(T_world_base, q)))
     return N
 
 

@@ -7,15 +7,15 @@ are taken from geometry, so that neither the points that name the axes nor the b
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 
 from screwkin.algebra.arrays import Array, numpy_of
 from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.screws import Screw
-from screwkin.algebra.se3 import Twist, Vector, as_array, dot, norm
+from screwkin.algebra.se3 import Twist, as_array
 from screwkin.compiler.program import kept
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.mechanism import WAIST, Mechanism
 from screwkin.model.robot import Robot
 
@@ -26,47 +26,14 @@ _CROSS = np.cross(np.eye(3)[:, None], np.eye(3)[None]).transpose(2, 0, 1)
 """a x b has the components a _CROSS[i] b; a contracted with it is the matrix of w x a, for any w."""
 
 
-def skeleton(screws: Sequence[Screw], tip: Vector) -> list[Vector]:
-    """One point on every axis of a limb, and the tip: each is the foot of the perpendicular from the next.
-
-    The distances of neighbouring points do not change as revolute joints turn: the next point moves on a
-    circle about the axis, and the foot is its centre. A prismatic joint has no line; its point is the next
-    one.
-
-    Args:
-        screws: the limb's axes from the base to the tip.
-        tip: its origin, in the same frame [m].
-
-    Returns:
-        len(screws) + 1 points, the tip last [m].
-    """
-    points = [tip]
-    for screw in reversed(screws):
-        p = points[0]
-        foot = p if screw.is_translation else screw.s0 + screw.s * dot(screw.s, p - screw.s0)
-        points.insert(0, foot)
-    return points
-
-
-def levers(screws: Sequence[Screw], tip: Vector) -> list[float]:
-    """How far every axis of a limb can be from the tip: the length of the skeleton from there on [m]."""
-    points = skeleton(screws, tip)
-    steps = [float(norm(b - a)) for a, b in pairwise(points)]
-    return [float(sum(steps[k:])) for k in range(len(steps))]
-
-
 @kept
 def characteristic_length(robot: Robot) -> float:
-    """Size of the robot [m]: the length of its longest limb, along the limb's ``skeleton``.
+    """Size of the robot [m]: the length of its longest limb, from axis to axis and to the tip.
 
     Of a loop it is the largest distance of its axes from their centre, in the zero pose. Joints of no limb
     and no loop count only where there are no others. A robot whose axes and tips all meet has size 1 m.
     """
-    sizes = [
-        levers([robot.joints[i].screw for i in robot.path_to(limb.link)], limb.frame.p)[0]
-        for limb in robot.limbs
-        if robot.path_to(limb.link)
-    ]
+    sizes = [float(max(SerialChain.of(robot, limb.name).levers, default=0.0)) for limb in robot.limbs]
     loops = [set(robot.path_to(c.link_a)) ^ set(robot.path_to(c.link_b)) for c in robot.closures]
     if not robot.limbs and not robot.closures:
         loops = [set(range(len(robot.joints)))]

@@ -9,18 +9,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from screwkin.algebra.scalar import Scalar, abs_, sqrt
-from screwkin.algebra.screws import Displacement, at
+from screwkin.algebra.screws import Displacement, at, turn
 from screwkin.algebra.se3 import NO_TWIST, UNTURNED, Rotation, Twist, Vector, cross, dot
 from screwkin.compiler.program import Recorder, kept
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.kinematics.arrays import Argument
 from screwkin.kinematics.door import Door
+from screwkin.kinematics.kinds import STATE
 from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.limb_rates import Split, pose_rates, split_of
 from screwkin.mechanism.mechanism import Mechanism, VirtualChain, mechanism_of
-from screwkin.mechanism.network import coupling_twists
-from screwkin.mechanism.scaling import characteristic_length, levers, reference_couplings
+from screwkin.mechanism.network import coupling_screws, coupling_twists
+from screwkin.mechanism.scaling import characteristic_length, reference_couplings
 from screwkin.model.robot import Robot
 
 
@@ -77,11 +78,8 @@ def secondary_door(robot: Robot, primary: tuple[str, ...], secondary: tuple[str,
 
 def secondary_arguments(robot: Robot, primary: Sequence[str]) -> list[Argument]:
     """State and primary rates, as messages name them."""
-    return [
-        Argument("T_world_base", "state.T_world_base", (4, 4), rigid=True),
-        Argument("q", "state.q", (len(robot.joints),)),
-        Argument("primary", "primary_rates", (len(primary),)),
-    ]
+    state = coupling_screws.definition.arguments(robot, STATE).values()
+    return [*(a for own in state for a in own), Argument("primary", "primary_rates", (len(primary),))]
 
 
 def _in_base_axes(mechanism: Mechanism, R: Rotation, q: Sequence[Scalar]) -> dict[str, Twist]:
@@ -89,7 +87,7 @@ def _in_base_axes(mechanism: Mechanism, R: Rotation, q: Sequence[Scalar]) -> dic
     real, back = set(mechanism.robot.joint_names), R.T
     level, turned = (coupling_twists(mechanism, axes, q) for axes in (UNTURNED, R))
     return {
-        name: level[k] if name in real else Twist(back @ turned[k].omega, back @ turned[k].v)
+        name: level[k] if name in real else turn(back, turned[k])
         for k, name in enumerate(mechanism.couplings)
     }
 
@@ -140,7 +138,7 @@ def _sizes(robot: Robot, tip: VirtualChain, length: float) -> dict[str, float]:
     own = {name: 1.0 if name.split(".")[1][0] == "r" else 1 / length**2 for name in tip.names}
     if any(joint.type != "revolute" or joint.screw.is_translation for joint in joints):
         return own
-    reach = levers([joint.screw for joint in joints], tip.limb.frame.p)
+    reach = SerialChain.of(robot, tip.limb.name).levers
     return own | {j.name: 1 + (r / length) ** 2 for j, r in zip(joints, reach, strict=True)}
 
 

@@ -19,7 +19,7 @@ from screwkin.kinematics.status import Status
 from screwkin.mechanism.least_values import least_values, network_values
 from screwkin.mechanism.mechanism import Mechanism
 from screwkin.mechanism.rates import block_name, block_rows, flat, network_of
-from screwkin.mechanism.scaling import referenced
+from screwkin.mechanism.scaling import centre, referenced
 from screwkin.model.state import State
 
 NEAR = 0.02
@@ -170,11 +170,8 @@ def _parallel(axes: Array) -> bool:
 
 def _meeting_point(screws: Array) -> Array | None:
     """The point through which all axes pass (nearly), if there is one."""
-    # A point p of the axis has p x w = v.
-    rows = [[[0.0, w[2], -w[1]], [-w[2], 0.0, w[0]], [w[1], -w[0], 0.0]] for w in screws[:, :3]]
-    A, b = np.reshape(rows, (-1, 3)), screws[:, 3:].reshape(-1)
-    p = np.asarray(np.linalg.lstsq(A, b, rcond=None)[0])
-    return p if np.abs(A @ p - b).max() < TOLERANCE else None
+    p = centre(screws.T)
+    return p if np.abs(np.cross(p, screws[:, :3]) - screws[:, 3:]).max() < TOLERANCE else None
 
 
 def _place(screws: Array, axis: Array) -> Array | None:

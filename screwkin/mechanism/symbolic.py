@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 from screwkin.algebra.scalar import Scalar, is_symbolic
@@ -16,7 +17,7 @@ from screwkin.algebra.se3 import ZERO, Twist, Vector, as_array, leaves, map_scal
 from screwkin.errors import InputError
 from screwkin.kinematics.positions import joint_twists, link_displacements, pose_in_base
 from screwkin.mechanism.chains import chain_screws
-from screwkin.mechanism.mechanism import Mechanism, coupling_graph, virtual_chains
+from screwkin.mechanism.mechanism import Mechanism, unchosen
 from screwkin.mechanism.network import network_blocks
 from screwkin.model.robot import Robot
 
@@ -114,7 +115,7 @@ def symbolic_loops(robot: Robot) -> tuple[SymbolicLimb, ...]:
 
 
 def named_formulas(robot: Robot) -> Robot:
-    """The robot with parameters that are roots or inverse functions of others kept by name."""
+    """The robot with parameters that are roots or inverse functions of others as symbols of their names."""
     import sympy
 
     hard = (sympy.asin, sympy.acos, sympy.atan, sympy.atan2)
@@ -146,11 +147,10 @@ def limb_alone(robot: Robot, limb: str) -> Robot:
 
 def _mechanism(robot: Robot) -> Mechanism:
     """The closed mechanism without a choice of primary couplings, which needs numbers."""
-    chains = virtual_chains(robot)
-    graph = coupling_graph(robot, chains)
-    if len(graph.edges) < len(graph.vertices):
+    mechanism = unchosen(robot)
+    if len(mechanism.couplings) < len(mechanism.links):
         raise InputError(f"{robot.name} has neither limbs nor closures, so no circuits to write down")
-    return Mechanism(robot, chains, graph, (), tuple(name for name, _, _ in graph.edges), 0)
+    return mechanism
 
 
 def coupling_symbols(mechanism: Mechanism) -> dict[str, Symbol]:
@@ -280,41 +280,19 @@ def _summed(
 
     if len(group) < 2:
         return expanded
-    gens = [w for a in group for w in waves[a]]
-    poly = sympy.Poly(expanded, *gens)
-    total: dict[Any, Any] = {}
-    for powers, coefficient in poly.terms():
-        # A sum of cosines and sines of integer combinations: ("cos" or "sin", combination) to factor.
-        wave: dict[tuple[bool, tuple[int, ...]], Any] = {(True, (0,) * len(group)): sympy.Integer(1)}
-        for k, power in enumerate(powers):
-            for _ in range(power):
-                wave = _times_wave(wave, k // 2, k % 2 == 0)
-        for key, factor in wave.items():
-            total[key] = total.get(key, 0) + factor * coefficient
-    terms = []
-    for (even, combination), factor in total.items():
-        angle = sympy.Add(*(n * a for n, a in zip(combination, group, strict=True)))
-        terms.append(sympy.expand(factor) * (sympy.cos(angle) if even else sympy.sin(angle)))
+    poly = sympy.Poly(expanded, *(w for a in group for w in waves[a]))
+    terms = [coefficient * _sum_of(tuple(group), powers) for powers, coefficient in poly.terms()]
     return sympy.expand(sympy.Add(*terms))
 
 
-def _times_wave(wave: Mapping[Any, Any], k: int, cosine: bool) -> dict[Any, Any]:
-    """A sum of waves times the cosine or sine of the k-th angle: product to sum."""
-    product: dict[Any, Any] = {}
-    for (even, combination), factor in wave.items():
-        for sign in (1, -1):
-            shifted = tuple(n + sign * (i == k) for i, n in enumerate(combination))
-            if cosine:
-                share, kind = factor / 2, even
-            elif even:
-                share, kind = factor * sign / 2, False  # cos A sin B = (sin(A+B) - sin(A-B))/2
-            else:
-                share, kind = -factor * sign / 2, True  # sin A sin B = (cos(A-B) - cos(A+B))/2
-            if next((n for n in shifted if n), 0) < 0:
-                shifted = tuple(-n for n in shifted)
-                share = share if kind else -share
-            product[kind, shifted] = product.get((kind, shifted), 0) + share
-    return {key: factor for key, factor in product.items() if factor != 0}
+@cache
+def _sum_of(group: tuple[Symbol, ...], powers: tuple[int, ...]) -> Scalar:
+    """A product of powers of the cosines and sines of some angles, as a sum of cosines and sines."""
+    import sympy
+    from sympy.simplify.fu import TR8
+
+    waves = [wave(a) for a in group for wave in (sympy.cos, sympy.sin)]
+    return TR8(sympy.Mul(*(wave**power for wave, power in zip(waves, powers, strict=True))))
 
 
 def _shortest(expanded: Scalar, moving: Sequence[Symbol]) -> Scalar:

@@ -7,34 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from screwkin.algebra.linear import cramer
 from screwkin.algebra.scalar import Scalar
-from screwkin.algebra.se3 import UNTURNED, ZERO, Pose, Rotation, Twist, Vector, cross, dot, rotate
+from screwkin.algebra.se3 import ZERO, Pose, Rotation, Twist, Vector, cross
 from screwkin.kinematics.positions import link_displacements, pose_in_base
-from screwkin.mechanism.chains import AXES, chain_coordinates, rotations
+from screwkin.mechanism.chains import chain_twists, rotations
 from screwkin.mechanism.mechanism import Mechanism, VirtualChain
 
 
 def _axes(chain: Sequence[str], R: Rotation) -> list[Vector]:
     """Present directions of the chain's three rotation axes, in their order."""
-    order = [f"r{a}" for a in rotations(chain)]
-    angles = chain_coordinates(order, Pose(R, ZERO))
-    turned, directions = UNTURNED, []
-    for coupling, angle in zip(order, angles, strict=True):
-        directions.append(turned @ AXES[coupling[1]])
-        turned = turned @ rotate(AXES[coupling[1]], angle)
-    return directions
-
-
-def _shares(directions: Sequence[Vector], w: Vector) -> list[Scalar]:
-    """Components of w along three directions that need not be perpendicular."""
-    a, b, c = directions
-    volume = dot(a, cross(b, c))
-    return [dot(w, cross(b, c)) / volume, dot(w, cross(c, a)) / volume, dot(w, cross(a, b)) / volume]
+    return [twist.omega for twist in chain_twists([f"r{a}" for a in rotations(chain)], R, ZERO)]
 
 
 def chain_rates(chain: Sequence[str], R: Rotation, omega: Vector, v: Vector) -> list[Scalar]:
     """Rates of a chain's couplings when its body turns at omega and its origin moves at v (world axes)."""
-    turning = dict(zip(rotations(chain), _shares(_axes(chain, R), omega), strict=True))
+    turning = dict(zip(rotations(chain), cramer(_axes(chain, R), omega)[0], strict=True))
     moving = dict(zip("xyz", v, strict=True))
     return [(moving if c[0] == "p" else turning)[c[1]] for c in chain]
 
@@ -44,12 +32,12 @@ def chain_accelerations(
 ) -> list[Scalar]:
     """Second derivatives of a chain's coordinates, from the body's alpha and its origin's acceleration."""
     directions = _axes(chain, R)
-    rates = _shares(directions, omega)
+    rates = cramer(directions, omega)[0]
     carried, bias = ZERO, ZERO
     for direction, rate in zip(directions, rates, strict=True):
         bias = bias + cross(carried, direction) * rate
         carried = carried + direction * rate
-    turning = dict(zip(rotations(chain), _shares(directions, alpha - bias), strict=True))
+    turning = dict(zip(rotations(chain), cramer(directions, alpha - bias)[0], strict=True))
     moving = dict(zip("xyz", a, strict=True))
     return [(moving if c[0] == "p" else turning)[c[1]] for c in chain]
 

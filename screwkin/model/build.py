@@ -2,67 +2,90 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from typing import Any
 
 from screwkin.algebra.scalar import Scalar, times
 from screwkin.algebra.screws import INFINITE, Screw
 from screwkin.algebra.se3 import UNTURNED, ZERO, Pose, Vector, X, Y, Z, rotate
-from screwkin.model.mirror import (
-    closes_within,
-    interleaved,
-    reflected_closure,
-    reflected_joint,
-    reflected_limb,
-    reflected_link,
-    reflected_sole,
-)
+from screwkin.model.mirror import closes_within, image, interleaved
 from screwkin.model.records import Box, Closure, Inertia, Joint, Limb, Link, Posture, RobotRecord, Sole
 from screwkin.model.rows import Rows
-from screwkin.model.schema import ClosureRow, FrameRow, InertiaRow, JointRow, LimbRow, LinkRow, MirrorRow
+from screwkin.model.schema import FrameRow, InertiaRow, JointRow, LimbRow, LinkRow, MirrorRow
 from screwkin.model.structure import Mirrored
 
 
-def robot_from_rows(rows: Rows, joints: Sequence[Joint], mirrored: Sequence[Mirrored]) -> RobotRecord:
-    """The records of rows without faults; ``joints`` are its joints, mirrored ones included."""
-    robot = rows.robot.row
+def with_images(rows: Rows, mirrored: Sequence[Mirrored], around: Collection[str]) -> Rows:
+    """The rows with those of mirrored limbs, each behind the rows that it is the image of.
+
+    Args:
+        rows: the table's rows, symbolic or not; faulty ones have no image.
+        mirrored: the mirrored limbs.
+        around: names of the joints whose mirrored position changes sign (``mirror.turns_around``).
+    """
+    entries = dict(rows.entries)
+    for limb in mirrored:
+        for table, own in entries.items():
+            images = [
+                replace(entry, row=image(entry.row, limb.part, entry.text("name") in around))
+                if entry.row is not None and _belongs(table, entry.row, limb)
+                else None
+                for entry in own
+            ]
+            entries[table] = interleaved(own, images)
+    plain = {row.name: row for _, row in rows.good("limb") if isinstance(row, LimbRow)}
+    entries["limb"] = tuple(
+        replace(entry, row=image(plain[entry.row.of], ()))
+        if isinstance(entry.row, MirrorRow) and entry.row.of in plain
+        else entry
+        for entry in rows["limb"]
+    )
+    return replace(rows, entries=entries)
+
+
+def _belongs(table: str, row: Any, limb: Mirrored) -> bool:
+    """True if a row is reflected for a limb."""
+    if table == "closure":
+        return closes_within(row.link_a, row.link_b, limb.part)
+    if table == "sole":
+        return bool(row.limb == limb.of)
+    return (table == "link" and row.name in limb.part) or (table == "joint" and row.child in limb.part)
+
+
+def robot_from_rows(rows: Rows) -> RobotRecord:
+    """The records of rows without faults, images of mirrored limbs among them."""
+    robot, joints = rows.robot.row, joints_of(rows)
+    origin: dict[str, Vector] = {row.child: row.s0 for _, row in rows.good("joint")}
     return RobotRecord(
         name=robot.name,
         description=robot.description,
         source=robot.source,
         base=robot.base,
         base_link=robot.base_link,
-        links=tuple(_links(rows, mirrored)),
-        joints=tuple(joints),
-        limbs=tuple(_limbs(rows)),
-        soles=tuple(_soles(rows, mirrored)),
-        closures=tuple(_closures(rows, mirrored)),
-        postures=tuple(_postures(rows, joints)),
+        links=tuple(_link(row, origin.get(row.name, ZERO)) for _, row in rows.good("link")),
+        joints=joints,
+        limbs=tuple(
+            Limb(row.name, row.kind, row.link, row.tip, _pose(row.frame), row.chain)
+            for _, row in rows.good("limb")
+        ),
+        soles=tuple(Sole(row.limb, tuple(row.corners)) for _, row in rows.good("sole")),
+        closures=tuple(
+            Closure(row.name, row.link_a, _pose(row.frame_a), row.link_b, _pose(row.frame_b))
+            for _, row in rows.good("closure")
+        ),
+        postures=tuple(
+            Posture(row.name, row.base_height or 0.0, tuple(row.q.get(joint.name, 0.0) for joint in joints))
+            for _, row in rows.good("posture")
+        ),
         waist=None if rows.waist is None else _pose(rows.waist.row),
         servos=rows.servos,
     )
 
 
-def own_joints(rows: Rows) -> Sequence[Joint]:
-    """The joints that have rows of their own."""
-    return [_joint(row) for _, row in rows.good("joint")]
-
-
-def all_joints(rows: Rows, mirrored: Sequence[Mirrored], around: Collection[str]) -> Sequence[Joint]:
-    """All joints in table order, mirrored ones after those they are the images of.
-
-    Args:
-        rows: the table's rows, symbolic or not.
-        mirrored: the mirrored limbs.
-        around: names of the joints whose mirrored position changes sign (``mirror.turns_around``).
-    """
-    joints = own_joints(rows)
-    for limb in mirrored:
-        images = [
-            reflected_joint(joint, limb.part, joint.name in around) if joint.child in limb.part else None
-            for joint in joints
-        ]
-        joints = interleaved(joints, images)
-    return joints
+def joints_of(rows: Rows) -> tuple[Joint, ...]:
+    """The joints in table order."""
+    return tuple(_joint(row) for _, row in rows.good("joint"))
 
 
 def _joint(row: JointRow) -> Joint:
@@ -71,15 +94,6 @@ def _joint(row: JointRow) -> Joint:
     return Joint(
         row.name, row.parent, row.child, row.type, screw, row.lower, row.upper, row.velocity, row.effort
     )
-
-
-def _links(rows: Rows, mirrored: Sequence[Mirrored]) -> Sequence[Link]:
-    origin: dict[str, Vector] = {row.child: row.s0 for _, row in rows.good("joint")}
-    links: Sequence[Link] = [_link(row, origin.get(row.name, ZERO)) for _, row in rows.good("link")]
-    for limb in mirrored:
-        images = [reflected_link(link) if link.name in limb.part else None for link in links]
-        links = interleaved(links, images)
-    return links
 
 
 def _link(row: LinkRow, origin: Vector) -> Link:
@@ -104,41 +118,3 @@ def _pose(row: FrameRow) -> Pose:
     """Rotation Rz(yaw) Ry(pitch) Rx(roll): turns about the fixed base axes, roll first."""
     roll, pitch, yaw = row.rpy
     return Pose(rotate(Z, yaw) @ rotate(Y, pitch) @ rotate(X, roll), row.xyz)
-
-
-def _closures(rows: Rows, mirrored: Sequence[Mirrored]) -> Sequence[Closure]:
-    def closure(row: ClosureRow) -> Closure:
-        return Closure(row.name, row.link_a, _pose(row.frame_a), row.link_b, _pose(row.frame_b))
-
-    closures: Sequence[Closure] = [closure(row) for _, row in rows.good("closure")]
-    for limb in mirrored:
-        images = [
-            reflected_closure(c, limb.part) if closes_within(c.link_a, c.link_b, limb.part) else None
-            for c in closures
-        ]
-        closures = interleaved(closures, images)
-    return closures
-
-
-def _soles(rows: Rows, mirrored: Sequence[Mirrored]) -> Sequence[Sole]:
-    soles: Sequence[Sole] = [Sole(row.limb, tuple(row.corners)) for _, row in rows.good("sole")]
-    for limb in mirrored:
-        images = [reflected_sole(sole, limb.name) if sole.limb == limb.of else None for sole in soles]
-        soles = interleaved(soles, images)
-    return soles
-
-
-def _limbs(rows: Rows) -> Iterator[Limb]:
-    """Limbs in table order; a mirrored one stands where it is declared."""
-
-    def limb(row: LimbRow) -> Limb:
-        return Limb(row.name, row.kind, row.link, row.tip, _pose(row.frame), row.chain)
-
-    plain = {row.name: limb(row) for _, row in rows.good("limb") if isinstance(row, LimbRow)}
-    for _, row in rows.good("limb"):
-        yield reflected_limb(plain[row.of], row.name) if isinstance(row, MirrorRow) else plain[row.name]
-
-
-def _postures(rows: Rows, joints: Sequence[Joint]) -> Iterator[Posture]:
-    for _, row in rows.good("posture"):
-        yield Posture(row.name, row.base_height or 0.0, tuple(row.q.get(joint.name, 0.0) for joint in joints))

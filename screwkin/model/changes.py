@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from screwkin.errors import InputError, UnknownNameError, expect
+from screwkin.errors import InputError, expect, one_of
 from screwkin.model.records import RobotRecord
 from screwkin.model.toml_edit import Place, edited
 
@@ -30,8 +30,7 @@ def changed_text(
     changes: dict[Place, Any] = {} if name is None else {("robot", "name"): name}
     own = data.get("parameters", {})
     for key, value in parameters.items():
-        if key not in own:
-            raise UnknownNameError("parameter", key, list(own))
+        one_of("parameter", key, own)
         changes["parameters", key] = _number(value, key)
     links, joints = (_rows(data.get(table, [])) for table in ("link", "joint"))
     for link, mass in wishes["masses"].items():
@@ -78,10 +77,7 @@ def _rows(rows: Iterable[Mapping[str, Any]]) -> dict[str, int]:
 
 def _has_row(name: str, kind: str, own: Mapping[str, int], known: Iterable[str]) -> bool:
     """Whether a link or joint has a row of its own; a mirrored one has none."""
-    names = list(known)
-    if name not in names:
-        raise UnknownNameError(kind, name, names)
-    return name in own
+    return one_of(kind, name, known) in own
 
 
 def _joint_values(what: str, joint: str, value: Any) -> dict[str, Any]:

@@ -125,11 +125,11 @@ class _Row:
 
 def _lines(text: str) -> list[tuple[int, list[str]]]:
     """Number and cells of every line that is no comment."""
-    found = []
+    lines = []
     for number, line in enumerate(text.splitlines(), 1):
         if line.strip() and not line.lstrip().startswith("#"):
-            found.append((number, [cell.strip() for cell in next(csv.reader([line]))]))
-    return found
+            lines.append((number, [cell.strip() for cell in next(csv.reader([line]))]))
+    return lines
 
 
 def _header_faults(where: str, header: Sequence[str]) -> Iterator[Fault]:
@@ -179,11 +179,11 @@ def _row(number: int, header: Sequence[str], cells: Sequence[str], faults: list[
 
 def _word_faults(row: _Row) -> Iterator[Fault]:
     for word, valid in (("convention", CONVENTIONS), ("type", TYPES)):
-        found = row.words.get(word, "")
-        if found not in valid and (found or word == "convention"):
-            no_helical = "DH parameters have no helical joints. " if found == "helical" else ""
-            fix = f"{near(found, valid)}{no_helical}Write {' or '.join(valid)}"
-            yield Fault(row.where, word, f"is {found!r}" if found else "is empty", fix)
+        given = row.words.get(word, "")
+        if given not in valid and (given or word == "convention"):
+            no_helical = "DH parameters have no helical joints. " if given == "helical" else ""
+            fix = f"{near(given, valid)}{no_helical}Write {' or '.join(valid)}"
+            yield Fault(row.where, word, f"is {given!r}" if given else "is empty", fix)
 
 
 def _number(cell: str, name: str, unit: str) -> tuple[float, tuple[str, str] | None]:

@@ -24,7 +24,7 @@ from itertools import pairwise
 from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.screws import Screw
 from screwkin.algebra.se3 import IDENTITY, Pose, Vector, cross, dot, map_scalars, norm
-from screwkin.errors import InputError, UnknownNameError
+from screwkin.errors import InputError, one_of
 from screwkin.model.dh import (
     CONVENTIONS,
     QUARTER,
@@ -35,7 +35,6 @@ from screwkin.model.dh import (
     DHType,
     row_transform,
 )
-from screwkin.model.robot import Robot
 from screwkin.model.values import UNIT_TOLERANCE
 
 PARALLEL = 1e-8
@@ -68,8 +67,7 @@ def dh_from_screws(
         InputError: a helical joint, an axis that is no unit vector, NaN or infinity; it names the joint.
         UnknownNameError: no such convention.
     """
-    if convention not in CONVENTIONS:
-        raise UnknownNameError("convention", str(convention), CONVENTIONS)
+    one_of("convention", convention, CONVENTIONS)
     names = [f"q{i + 1}" for i in range(len(screws))] if names is None else list(names)
     if len(names) != len(screws):
         raise InputError(f"{len(screws)} screws, but {len(names)} names; give each joint its name")
@@ -86,25 +84,6 @@ def dh_from_screws(
     if convention == "modified":
         return DHTable(convention, tuple(rows), first, steps[-1].pose @ last)
     return DHTable(convention, tuple(rows), first @ steps[0].pose, last)
-
-
-def dh_from_limb(robot: Robot, limb: str, convention: Convention = "modified") -> DHTable:
-    """The table of a limb, from the robot's base frame to the limb's tip, with the joints' names.
-
-    Args:
-        robot: any robot of numbers.
-        limb: name of the limb or of its tip.
-        convention: ``standard`` or ``modified``.
-
-    Raises:
-        UnknownNameError: no such limb or convention.
-        InputError: the limb has a helical joint.
-    """
-    chosen = robot.limb(limb)
-    joints = [robot.joints[i] for i in robot.path_to(chosen.link)]
-    screws, names = [joint.screw for joint in joints], [joint.name for joint in joints]
-    table = dh_from_screws(screws, chosen.frame, convention, names)
-    return DHTable(table.convention, table.rows, table.base, table.tool, chosen.name, chosen.tip)
 
 
 def fixed_rows(pose: Pose, name: str, convention: Convention) -> list[DHRow]:

@@ -185,8 +185,8 @@ def _parse(text: str) -> ast.expr:
 
 
 def _names(tree: ast.expr) -> tuple[str, ...]:
-    found = (node.id for node in ast.walk(tree) if isinstance(node, ast.Name))
-    return tuple(dict.fromkeys(name for name in found if name not in CONSTANTS and name not in FUNCTIONS))
+    used = (node.id for node in ast.walk(tree) if isinstance(node, ast.Name))
+    return tuple(dict.fromkeys(name for name in used if name not in CONSTANTS and name not in FUNCTIONS))
 
 
 def _value(node: ast.expr, quoted: str, names: Mapping[str, Scalar], kind: SimpleNamespace) -> Scalar:

@@ -10,23 +10,23 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from screwkin.algebra.screws import Screw
-from screwkin.algebra.se3 import Pose, Rotation, Vector
-from screwkin.model.records import Box, Closure, Inertia, Joint, Limb, Link, Sole
+from screwkin.algebra.se3 import Vector
+from screwkin.model.schema import InertiaRow, JointRow, Row
 
 Item = TypeVar("Item")
 
 _SIDE = re.compile(r"(?<![A-Za-z])(right|left|Right|Left|RIGHT|LEFT)(?![a-z])")
 _OTHER = {"right": "left", "Right": "Left", "RIGHT": "LEFT"}
 _OTHER |= {left: right for right, left in _OTHER.items()}
+_NAMES = ("name", "link", "tip", "limb")
+_LINKS = ("parent", "child", "link_a", "link_b")
 
 
 def swapped(name: str) -> str:
     """The name on the other side: right <-> left; unchanged if it names no side."""
-    return _SIDE.sub(lambda found: _OTHER[found[0]], name)
+    return _SIDE.sub(lambda side: _OTHER[side[0]], name)
 
 
 def is_sided(name: str) -> bool:
@@ -57,83 +57,46 @@ def interleaved(items: Sequence[Item], images: Sequence[Item | None]) -> tuple[I
     return (*items[: last + 1], *(image for image in images if image is not None), *items[last + 1 :])
 
 
-def reflected_point(p: Vector) -> Vector:
-    """M p."""
-    return Vector(p.x, -p.y, p.z)
-
-
-def reflected_pose(pose: Pose) -> Pose:
-    """M T M: a proper pose again."""
-    columns = (reflected_point(column) for column in (pose.R.x, -pose.R.y, pose.R.z))
-    return Pose(Rotation(*columns), reflected_point(pose.p))
-
-
-def reflected_link(link: Link) -> Link:
-    """The link's mirror image."""
-    i = link.inertia
-    return Link(
-        swapped(link.name),
-        link.mass,
-        reflected_point(link.com),
-        Inertia(i.xx, i.yy, i.zz, -i.xy, i.xz, -i.yz),
-        reflected_pose(link.frame),
-        tuple(Box(reflected_point(box.center), box.size) for box in link.boxes),
-    )
-
-
-def turns_around(joint: Joint) -> bool:
+def turns_around(joint: JointRow) -> bool:
     """True if the mirrored joint keeps its axis and takes the negative position."""
-    s = joint.screw.s
+    s = joint.s
     return bool(s.x == 0 and s.z == 0) if joint.type == "prismatic" else bool(s.y == 0)
 
 
-def reflected_joint(joint: Joint, part: Collection[str], around: bool) -> Joint:
-    """The joint's mirror image.
+def image(row: Row, part: Collection[str], around: bool = False) -> Row:
+    """The mirror image of a row, with whatever stands within it.
 
     Args:
-        joint: the joint to reflect.
+        row: of a link, a joint, a closure, a limb or a sole.
         part: names of the links that are reflected with it.
-        around: whether its position changes sign; what ``turns_around`` says of its numeric twin.
+        around: whether a joint's position changes sign; what ``turns_around`` says of its numeric twin.
     """
-    slides, image = joint.type == "prismatic", reflected_point(joint.screw.s)
-    return Joint(
-        swapped(joint.name),
-        _moved(joint.parent, part),
-        _moved(joint.child, part),
-        joint.type,
-        Screw(
-            image if slides != around else -image,
-            reflected_point(joint.screw.s0),
-            joint.screw.pitch if slides else -joint.screw.pitch,
-        ),
-        0.0 - joint.upper if around else joint.lower,  # 0.0 - x, so that no limit reads -0
-        0.0 - joint.lower if around else joint.upper,
-        joint.velocity,
-        joint.effort,
-    )
+    new = {key: _reflected(key, getattr(row, key), part) for key in type(row).model_fields}
+    if isinstance(row, JointRow):
+        slides = row.type == "prismatic"
+        new["s"] = new["s"] if slides != around else -new["s"]
+        new["pitch"] = row.pitch if slides else -row.pitch
+        if around:  # 0.0 - x, so that no limit reads -0
+            new["lower"], new["upper"] = 0.0 - row.upper, 0.0 - row.lower
+    elif isinstance(row, InertiaRow):
+        new["xy"], new["yz"] = -row.xy, -row.yz
+    return row.model_copy(update=new)
 
 
-def reflected_limb(limb: Limb, name: str) -> Limb:
-    """The limb's mirror image."""
-    return replace(
-        limb, name=name, link=swapped(limb.link), tip=swapped(limb.tip), frame=reflected_pose(limb.frame)
-    )
-
-
-def reflected_sole(sole: Sole, limb: str) -> Sole:
-    """The sole's mirror image, its corners counter-clockwise again."""
-    return Sole(limb, tuple(reflected_point(corner) for corner in reversed(sole.corners)))
-
-
-def reflected_closure(closure: Closure, part: Collection[str]) -> Closure:
-    """The closure's mirror image."""
-    return Closure(
-        swapped(closure.name),
-        _moved(closure.link_a, part),
-        reflected_pose(closure.frame_a),
-        _moved(closure.link_b, part),
-        reflected_pose(closure.frame_b),
-    )
+def _reflected(key: str, value: Any, part: Collection[str]) -> Any:
+    """A value of a row, reflected: a name, a point, turns about the fixed axes, or a row or list of these."""
+    if isinstance(value, Row):
+        return image(value, part)
+    if isinstance(value, list):
+        items = [_reflected(key, item, part) for item in value]
+        return items[::-1] if key == "corners" else items  # counter-clockwise again
+    if isinstance(value, Vector):
+        if key == "rpy":
+            return Vector(-value.x, value.y, -value.z)
+        return Vector(value.x, value.y if key == "size" else -value.y, value.z)
+    if key in _NAMES or (key in _LINKS and value in part):
+        return swapped(value)
+    return value
 
 
 def closes_within(link_a: str, link_b: str, part: Collection[str]) -> bool:
@@ -142,7 +105,3 @@ def closes_within(link_a: str, link_b: str, part: Collection[str]) -> bool:
     return any(inside) and all(
         there or not is_sided(name) for name, there in zip((link_a, link_b), inside, strict=True)
     )
-
-
-def _moved(link: str, part: Collection[str]) -> str:
-    return swapped(link) if link in part else link

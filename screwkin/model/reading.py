@@ -8,7 +8,7 @@ from typing import Any
 
 from screwkin.algebra.scalar import Scalar
 from screwkin.errors import Fault, TableError, near
-from screwkin.model.build import all_joints, own_joints, robot_from_rows
+from screwkin.model.build import joints_of, robot_from_rows, with_images
 from screwkin.model.checks import row_faults
 from screwkin.model.expression import listed, resolve_parameters
 from screwkin.model.mirror import turns_around
@@ -24,7 +24,7 @@ class CheckedTable:
 
     Attributes:
         numbers: values of the parameters; None for a faulty one.
-        rows: all rows.
+        rows: all rows, those of mirrored limbs among them.
         mirrored: limbs declared by reflection.
         around: names of the joints whose mirrored position changes sign.
         structural: faults of names and connections.
@@ -50,10 +50,10 @@ def checked_table(data: Mapping[str, Any]) -> CheckedTable:
     mirrored, wrong = mirrored_limbs(rows)
     structural = [*wrong, *structure_faults(rows, mirrored)]
     faults += [*more, *wrong, *row_faults(rows), *structural[len(wrong) :]]
-    around = frozenset(joint.name for joint in own_joints(rows) if turns_around(joint))
-    joints = all_joints(rows, mirrored, around)
-    faults += _posture_faults(rows, joints, joint_names(rows, mirrored))
-    return CheckedTable(numbers, rows, mirrored, around, structural, faults)
+    around = frozenset(joint.name for _, joint in rows.good("joint") if turns_around(joint))
+    whole = with_images(rows, mirrored, around)
+    faults += _posture_faults(rows, joints_of(whole), joint_names(rows, mirrored))
+    return CheckedTable(numbers, whole, mirrored, around, structural, faults)
 
 
 def read_table(text: str, path: str, symbolic: bool = False) -> RobotRecord:
@@ -75,9 +75,8 @@ def read_table(text: str, path: str, symbolic: bool = False) -> RobotRecord:
     names, rows = table.numbers, table.rows
     if symbolic:
         names, _ = resolve_parameters(parameters_of(data), symbolic=True)
-        rows, _ = read_rows(data, names, table.numbers)
-    joints = all_joints(rows, table.mirrored, table.around)
-    record = robot_from_rows(rows, joints, table.mirrored)
+        rows = with_images(read_rows(data, names, table.numbers)[0], table.mirrored, table.around)
+    record = robot_from_rows(rows)
     return replace(record, parameters=dict(names), text=text, path=path)
 
 

@@ -1,4 +1,4 @@
-"""What is wrong with a robot made from records: written as a table, it goes through the checks of a file."""
+"""What is wrong with a robot built from records: written as a table, it goes through the checks of a file."""
 
 from __future__ import annotations
 

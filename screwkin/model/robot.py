@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any, Self
 
 from screwkin.algebra.scalar import Scalar, is_symbolic
-from screwkin.algebra.se3 import UNTURNED, Pose, Vector
-from screwkin.errors import InputError, UnknownNameError, expect
+from screwkin.algebra.se3 import IDENTITY, Pose
+from screwkin.errors import InputError, UnknownNameError, expect, one_of
 from screwkin.model.changes import changed_text, check_followed
 from screwkin.model.display import figure, html_table, listing
 from screwkin.model.reading import read_table
@@ -53,7 +53,7 @@ __all__ = [
 class Robot(RobotRecord):
     """A robot or mechanism. Links and joints stand in table order; q is in the order of ``joints``.
 
-    Fields are those of ``RobotRecord``. However it is made, it is checked as a table file is.
+    Fields are those of ``RobotRecord``. However it is built, it is checked as a table file is.
 
     Raises:
         TableError: the records have faults; it lists all of them.
@@ -65,7 +65,17 @@ class Robot(RobotRecord):
 
     @classmethod
     def from_text(cls, text: str, path: str = "<text>", symbolic: bool = False) -> Self:
-        """The robot of a table's text in TOML, see ``parse_robot``."""
+        """The robot of a table's text in TOML.
+
+        Args:
+            text: TOML; the comments of the bundled tables explain its keys.
+            path: where it comes from, for messages and for ``Robot.path``.
+            symbolic: keep the table's parameters as real sympy symbols of the same names wherever they are
+                used in screws, frames, masses, inertias, boxes and soles; limits and postures stay numbers.
+
+        Raises:
+            TableError: the text has faults; it lists all of them.
+        """
         robot = cls(**vars(read_table(text, path, symbolic)))
         robot.__dict__["text_matches"] = True
         return robot
@@ -237,15 +247,14 @@ class Robot(RobotRecord):
         Raises:
             UnknownNameError: no such frame.
         """
-        if name == "base":
-            return self.base_link, Pose(UNTURNED, Vector(0, 0, 0))
-        for limb in self.limbs:
-            if limb.tip == name:
-                return limb.link, limb.frame
-        for link in self.links:
-            if link.name == name:
-                return link.name, link.frame
-        raise UnknownNameError("frame", name, ("base", *self.tip_names, *self.link_names))
+        return self._frames.get(name) or one_of("frame", name, self._frames)
+
+    @cached_property
+    def _frames(self) -> Mapping[str, tuple[str, Pose]]:
+        tips = {limb.tip: (limb.link, limb.frame) for limb in self.limbs}
+        links = {link.name: (link.name, link.frame) for link in self.links}
+        base = {"base": (self.base_link, IDENTITY)}
+        return {**base, **tips, **links, **base}
 
     def with_inertia_floor(self, mass: float = 1e-6, inertia: float = 1e-6) -> Robot:
         """The robot with every link at least so heavy: what simulators need for massless brackets.

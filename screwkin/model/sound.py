@@ -61,19 +61,11 @@ def _names_certified(robot: RobotRecord) -> bool:
 
 def _is_tree(base: str, links: set[str], joints: Sequence[Joint]) -> bool:
     """Every link but the base is the child of exactly one joint and hangs, link by link, from the base."""
-    above = {joint.child: joint.parent for joint in joints}
-    if base not in links or {*above, base} != links or len(joints) != len(links) - 1:
-        return False
-    hung = {base}
-    for link in links:
-        path = []
-        while link not in hung:
-            path.append(link)
-            if len(path) > len(links) or above[link] not in links:
-                return False
-            link = above[link]
-        hung.update(path)
-    return True
+    hung, left = {base}, {joint.child: joint.parent for joint in joints}
+    while ready := {child for child, parent in left.items() if parent in hung}:
+        hung |= ready
+        left = {child: parent for child, parent in left.items() if child not in ready}
+    return hung == links and len(joints) == len(links) - 1
 
 
 def _numbers_certified(robot: RobotRecord) -> bool:

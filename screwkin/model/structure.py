@@ -62,7 +62,7 @@ def mirrored_limbs(rows: Rows) -> tuple[list[Mirrored], list[Fault]]:
     """Every limb declared by reflection, with its links; and the faults of such declarations."""
     plain = {entry.text("name"): entry for entry in rows["limb"] if not _is_mirror(entry)}
     carried, done, faults = carried_links(rows), set[str](), list[Fault]()
-    found: list[Mirrored] = []
+    mirrored: list[Mirrored] = []
     for entry in rows["limb"]:
         name, of = entry.text("name"), entry.text("of")
         if not _is_mirror(entry) or not name or not of:
@@ -75,10 +75,10 @@ def mirrored_limbs(rows: Rows) -> tuple[list[Mirrored], list[Fault]]:
             fix = f"Write name = {swapped(of)!r}" if is_sided(of) else "Call the limbs right_... and left_..."
             faults.append(Fault(entry.where, "name", f"{name!r} is not {of!r} on the other side", fix))
         part = limb_part(carried, plain[of].text("link"))
-        found.append(Mirrored(entry.where, name, of, tuple(link for link in part if link not in done)))
+        mirrored.append(Mirrored(entry.where, name, of, tuple(link for link in part if link not in done)))
         done.update(part)
         faults += _sideless(rows, entry, plain[of], part)
-    return found, faults
+    return mirrored, faults
 
 
 def _is_mirror(entry: TableEntry) -> bool:

@@ -68,19 +68,7 @@ def robot_from_text(text: str, name: str = "<text>", symbolic: bool = False) -> 
     return _read(text, name, symbolic)
 
 
-def parse_robot(text: str, path: str = "<text>", symbolic: bool = False) -> Robot:
-    """The robot of a table's text in TOML.
-
-    Args:
-        text: TOML; the comments of the bundled tables explain its keys.
-        path: where it comes from, for messages and for ``Robot.path``.
-        symbolic: keep the table's parameters as real sympy symbols of the same names wherever they are used
-            in screws, frames, masses, inertias, boxes and soles; limits and postures stay numbers.
-
-    Raises:
-        TableError: the text has faults; it lists all of them.
-    """
-    return Robot.from_text(text, path, symbolic)
+parse_robot = Robot.from_text
 
 
 def _read(text: str, name: str, symbolic: bool) -> Robot:

@@ -140,7 +140,7 @@ def _value_end(text: str, at: int) -> int:
 
 def _end(pattern: re.Pattern[str], text: str, at: int) -> int:
     """Where a match that begins here ends."""
-    found = pattern.match(text, at)
-    if found is None:
+    matched = pattern.match(text, at)
+    if matched is None:
         raise KeyError(text[at : at + 20])
-    return found.end()
+    return matched.end()

@@ -8,12 +8,13 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.se3 import UNTURNED, ZERO, Pose, Rotation, Vector, leaves
 from screwkin.errors import InputError
-from screwkin.model.records import Closure, Joint, Limb, Link, Posture, RobotRecord, Sole, open_scalars
+from screwkin.model.records import Joint, Limb, Link, Posture, RobotRecord, open_scalars
 from screwkin.model.values import COUPLINGS
 
 _UNLIMITED = {"lower": -math.inf, "upper": math.inf, "velocity": math.inf, "effort": math.inf}
@@ -45,9 +46,9 @@ def table_data(robot: RobotRecord) -> dict[str, Any]:
         "robot": {key: value for key, value in head.items() if value},
         "link": [_link(link, origins.get(link.name, ZERO)) for link in robot.links],
         "joint": [_joint(joint) for joint in robot.joints],
-        "closure": [_closure(closure) for closure in robot.closures],
+        "closure": [_row(closure) for closure in robot.closures],
         "limb": [_limb(limb) for limb in robot.limbs],
-        "sole": [_sole(sole) for sole in robot.soles],
+        "sole": [_row(sole) for sole in robot.soles],
         "waist": {} if robot.waist is None else _frame(robot.waist),
         "posture": [_posture(posture, robot) for posture in robot.postures],
         "servos": dict(robot.servos),
@@ -94,7 +95,7 @@ def _block(title: str, values: Mapping[str, Any]) -> str:
 def _link(link: Link, origin: Vector) -> dict[str, Any]:
     row: dict[str, Any] = {"name": link.name, "mass": link.mass}
     if link.mass or leaves(link.com) != leaves(link.frame.p):
-        row["com"] = _vector(link.com)
+        row["com"] = list(link.com)
     i = link.inertia
     moments = {"xx": i.xx, "yy": i.yy, "zz": i.zz, "xy": i.xy, "xz": i.xz, "yz": i.yz}
     if link.mass or any(moments.values()):
@@ -102,7 +103,7 @@ def _link(link: Link, origin: Vector) -> dict[str, Any]:
     if leaves(link.frame) != leaves(Pose(UNTURNED, origin)):
         row["frame"] = _frame(link.frame)
     if link.boxes:
-        row["boxes"] = [{"center": _vector(box.center), "size": _vector(box.size)} for box in link.boxes]
+        row["boxes"] = _plain(link.boxes)
     return row
 
 
@@ -113,8 +114,8 @@ def _joint(joint: Joint) -> dict[str, Any]:
         "parent": joint.parent,
         "child": joint.child,
         "type": joint.type,
-        "s": _vector(screw.s),
-        "s0": _vector(screw.s0),
+        "s": list(screw.s),
+        "s0": list(screw.s0),
     }
     if joint.type == "helical" or (joint.type == "revolute" and screw.pitch != 0):
         row["pitch"] = screw.pitch
@@ -122,26 +123,8 @@ def _joint(joint: Joint) -> dict[str, Any]:
     return {**row, **{key: x for key, x in limits.items() if x != _UNLIMITED[key]}}
 
 
-def _closure(closure: Closure) -> dict[str, Any]:
-    return {
-        "name": closure.name,
-        "link_a": closure.link_a,
-        "frame_a": _frame(closure.frame_a),
-        "link_b": closure.link_b,
-        "frame_b": _frame(closure.frame_b),
-    }
-
-
 def _limb(limb: Limb) -> dict[str, Any]:
-    row: dict[str, Any] = {"name": limb.name, "kind": limb.kind, "link": limb.link, "tip": limb.tip}
-    row["frame"] = _frame(limb.frame)
-    if limb.chain != COUPLINGS:
-        row["chain"] = list(limb.chain)
-    return row
-
-
-def _sole(sole: Sole) -> dict[str, Any]:
-    return {"limb": sole.limb, "corners": [_vector(corner) for corner in sole.corners]}
+    return {key: value for key, value in _row(limb).items() if key != "chain" or value != list(COUPLINGS)}
 
 
 def _posture(posture: Posture, robot: RobotRecord) -> dict[str, Any]:
@@ -149,13 +132,24 @@ def _posture(posture: Posture, robot: RobotRecord) -> dict[str, Any]:
     return {"name": posture.name, "base_height": posture.base_height, "q": q}
 
 
-def _vector(v: Vector) -> list[Scalar]:
-    return list(v)
+def _row(record: Any) -> dict[str, Any]:
+    """A record as a row of the same keys."""
+    return {f.name: _plain(getattr(record, f.name)) for f in fields(record)}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Vector):
+        return list(value)
+    if isinstance(value, Pose):
+        return _frame(value)
+    if isinstance(value, tuple):
+        return [_plain(item) for item in value]
+    return _row(value) if is_dataclass(value) else value
 
 
 def _frame(pose: Pose) -> dict[str, Any]:
     turned = leaves(pose.R) != leaves(UNTURNED)
-    return {"xyz": _vector(pose.p), **({"rpy": list(rpy_of(pose.R))} if turned else {})}
+    return {"xyz": list(pose.p), **({"rpy": list(rpy_of(pose.R))} if turned else {})}
 
 
 def toml_value(value: Any) -> str:

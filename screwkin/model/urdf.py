@@ -57,7 +57,7 @@ def urdf_from_robot(robot: Robot) -> str:
     Raises:
         InputError: the robot has helical joints or closures, which URDF cannot say; all are named.
     """
-    _refuse_what_urdf_lacks(robot)
+    _refuse_what_urdf_cannot_say(robot)
     root = ElementTree.Element("robot", name=robot.name)
     frames, colours = urdf_frames(robot), link_colours(robot)
     palette = {WHITE: "white", SLATE: "slate", ORANGE: "orange"}
@@ -72,7 +72,7 @@ def urdf_from_robot(robot: Robot) -> str:
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
-def _refuse_what_urdf_lacks(robot: Robot) -> None:
+def _refuse_what_urdf_cannot_say(robot: Robot) -> None:
     helical = [joint.name for joint in robot.joints if joint.type == "helical"]
     if helical:
         raise InputError(f"robot {robot.name}: URDF has no helical joints, but it has {', '.join(helical)}")

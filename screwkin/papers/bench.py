@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import cached_property
 from typing import Any, TypeVar
 
 from screwkin.analysis.account import Account, account_of
@@ -13,7 +14,6 @@ from screwkin.analysis.validate import Validation, validate
 from screwkin.gait.files import load_gait
 from screwkin.gait.record import Gait
 from screwkin.gait.walk import walk
-from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
 
 T = TypeVar("T")
@@ -24,11 +24,11 @@ Changes = Mapping[str, str | float]
 class Bench:
     """What measures share.
 
-    ``robot`` is the paper's, the default of every measure; ``changes`` apply to every gait.
+    ``robot`` is the paper's; ``changes`` apply to every gait.
     """
 
     def __init__(self, robot: str, changes: Changes | None = None) -> None:
-        self._default = robot
+        self.robot = load_robot(robot)
         self._changes = dict(changes or {})
         self._results: dict[tuple[object, ...], Any] = {}
 
@@ -39,27 +39,16 @@ class Bench:
         result: T = self._results[key]
         return result
 
-    def robot(self, name: str = "") -> Robot:
-        """A robot; the paper's if no name is given."""
-        chosen = name or self._default
-        return self.once(("robot", chosen), lambda: load_robot(chosen))
-
     def facts(self, robot: str = "") -> Facts:
-        """Counts and conditioning of a robot's closed mechanism at home."""
-        table = self.robot(robot)
-        return self.once(("facts", table.name), lambda: facts_of(table))
+        """Counts and conditioning of a robot's closed mechanism at home; default: the paper's robot."""
+        return self.once(("facts", robot), lambda: facts_of(load_robot(robot) if robot else self.robot))
 
-    def account(
-        self,
-        gait: str,
-        steps: int | None = None,
-        robot: str = "",
-        changes: Changes | None = None,
-    ) -> Account:
+    def account(self, gait: str, steps: int | None = None, changes: Changes | None = None) -> Account:
         """A walk and its balance."""
-        table = self.robot(robot)
-        key = ("account", table.name, gait, steps, *sorted((changes or {}).items()))
-        return self.once(key, lambda: account_of(table, walk(table, self.gait(gait, changes), steps)))
+        key = ("account", gait, steps, *sorted((changes or {}).items()))
+        return self.once(
+            key, lambda: account_of(self.robot, walk(self.robot, self.gait(gait, changes), steps))
+        )
 
     def gait(self, name: str, changes: Changes | None = None) -> Gait:
         """A gait as the paper walks it, with further changes."""
@@ -72,7 +61,7 @@ class Bench:
         key = ("validation", trajectory.sha256, sole_stiffness)
         return self.once(key, lambda: validate(account.robot, trajectory, "pybullet", compliance=compliance))
 
-    def comparison(self, robot: str = "") -> Comparison:
+    @cached_property
+    def comparison(self) -> Comparison:
         """Screws against DH tables."""
-        table = self.robot(robot)
-        return self.once(("comparison", table.name), lambda: compare_models(table, rounds=7))
+        return compare_models(self.robot, rounds=7)

@@ -12,10 +12,14 @@ import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
+from pydantic_core import ErrorDetails
 
 from screwkin.errors import Fault, FileFaults, InputError
 from screwkin.model.library import find_paper
+from screwkin.model.toml import read_text
 
 Value = float | int | str | Sequence[float] | None
 
@@ -34,14 +38,19 @@ UNITS: Mapping[str, float] = {
 """How many of a unit make one of the SI."""
 
 
+_STRICT = ConfigDict(extra="forbid")
+_ALIASES = {"with_": "with", "rows": "row", "pictures": "picture", "sections": "section"}
+
+
 @dataclass(frozen=True)
 class Claim:
     """One line: what the paper prints, and the measure that returns our value."""
 
+    __pydantic_config__ = _STRICT
     item: str
     measure: str
-    with_: Mapping[str, Any] = field(default_factory=dict)
-    paper: Value = None
+    with_: Annotated[Mapping[str, Any], Field(alias="with")] = field(default_factory=dict)
+    paper: Any = None
     note: str = ""
     unit: str = ""
     form: str = ""
@@ -52,33 +61,36 @@ class Claim:
 class Picture:
     """A figure to be drawn again: name of the drawing, its arguments, and what it shows."""
 
+    __pydantic_config__ = _STRICT
     draw: str
     caption: str
-    with_: Mapping[str, Any] = field(default_factory=dict)
+    with_: Annotated[Mapping[str, Any], Field(alias="with")] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Section:
     """A table, figure or claim of the paper."""
 
+    __pydantic_config__ = _STRICT
     place: str
     title: str
     text: str = ""
-    rows: tuple[Claim, ...] = ()
-    pictures: tuple[Picture, ...] = ()
+    rows: Annotated[tuple[Claim, ...], Field(alias="row")] = ()
+    pictures: Annotated[tuple[Picture, ...], Field(alias="picture")] = ()
 
 
 @dataclass(frozen=True)
 class Paper:
     """A paper, as far as it can be measured; its walks are those of gait files with some ``changes``."""
 
+    __pydantic_config__ = _STRICT
     name: str
     title: str
     source: str
     robot: str
-    sections: tuple[Section, ...]
+    sections: Annotated[tuple[Section, ...], Field(alias="section")]
     text: str = ""
-    changes: Mapping[str, str | float] = field(default_factory=dict)
+    changes: Mapping[str, Any] = field(default_factory=dict)
 
 
 def load_paper(name_or_path: str | Path) -> Paper:
@@ -89,11 +101,7 @@ def load_paper(name_or_path: str | Path) -> Paper:
         FileFaults: faults of the file, all at once.
     """
     path = find_paper(name_or_path)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"cannot read {path}: {error}") from None
-    return parse_paper(text, str(path))
+    return parse_paper(read_text(path, FileFaults), str(path))
 
 
 def parse_paper(text: str, path: str = "<text>") -> Paper:
@@ -102,65 +110,42 @@ def parse_paper(text: str, path: str = "<text>") -> Paper:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{path}: no valid TOML: {error}") from None
-    faults: list[Fault] = []
-    head = _checked(Paper, data.get("paper"), "[paper]", faults, ("sections",))
-    if not isinstance(head.get("changes", {}), dict):
-        faults.append(Fault("[paper]", "changes", "no table", "Write { parameter = value } of the gaits"))
-    sections = []
-    for number, table in enumerate(_tables(data, "section", faults), 1):
-        where = f"section {number}"
-        values = _checked(Section, table, where, faults, ("rows", "pictures"), ("row", "picture"))
-        rows = [
-            _row(row, f"{where}, row {k}", faults) for k, row in enumerate(_tables(table, "row", faults), 1)
-        ]
-        drawn = [
-            _checked(Picture, picture, f"{where}, picture {k}", faults)
-            for k, picture in enumerate(_tables(table, "picture", faults), 1)
-        ]
-        if not faults:
-            pictures = tuple(Picture(**picture) for picture in drawn)
-            sections.append(Section(**values, rows=tuple(Claim(**row) for row in rows), pictures=pictures))
-    faults += [Fault("", key, "unknown key", "Remove it") for key in data if key not in ("paper", "section")]
+    head = data.get("paper")
+    if not isinstance(head, dict):
+        raise FileFaults(path, [Fault("[paper]", "", "no table", "Write its keys")])
+    faults = [Fault("", key, "unknown key", "Remove it") for key in data if key not in ("paper", "section")]
+    try:
+        paper = _PAPER.validate_python({**head, "section": data.get("section", [])})
+    except ValidationError as wrong:
+        raise FileFaults(path, [*map(_fault, wrong.errors(include_url=False)), *faults]) from None
+    for number, section in enumerate(paper.sections, 1):
+        for k, row in enumerate(section.rows, 1):
+            if row.unit and row.unit not in UNITS:
+                fix = f"Write one of {', '.join(UNITS)}"
+                where = f"section {number}, row {k}"
+                faults.append(Fault(where, "unit", f"unknown unit {row.unit!r}", fix))
     if faults:
         raise FileFaults(path, faults)
-    return Paper(**head, sections=tuple(sections))
+    return paper
 
 
-def _row(table: Any, where: str, faults: list[Fault]) -> dict[str, Any]:
-    values = _checked(Claim, table, where, faults)
-    unit = values.get("unit", "")
-    if unit and unit not in UNITS:
-        faults.append(Fault(where, "unit", f"unknown unit {unit!r}", f"Write one of {', '.join(UNITS)}"))
-    return values
+_PAPER = TypeAdapter(Paper)
+_RECORDS = {"": Paper, "section": Section, "row": Claim, "picture": Picture}
 
 
-def _tables(data: Any, key: str, faults: list[Fault]) -> list[Any]:
-    tables = data.get(key, []) if isinstance(data, dict) else []
-    if not isinstance(tables, list):
-        faults.append(Fault("", key, "no list of tables", f"Write [[{key}]]"))
-        return []
-    return tables
-
-
-def _checked(
-    kind: type,
-    table: Any,
-    where: str,
-    faults: list[Fault],
-    nested: Sequence[str] = (),
-    besides: Sequence[str] = (),
-) -> dict[str, Any]:
-    """The keys of a table as arguments of a record; missing and unknown ones become faults."""
-    if not isinstance(table, dict):
-        faults.append(Fault(where, "", "no table", "Write its keys"))
-        return {}
-    known = {f.name.rstrip("_"): f for f in fields(kind) if f.name not in nested}
-    values = {}
-    for key, value in table.items():
-        if key in known:
-            values[known[key].name] = value
-        elif key not in besides:
-            faults.append(Fault(where, key, "unknown key", f"Valid: {', '.join([*known, *besides])}"))
-    needed = [name for name, f in known.items() if f.default is f.default_factory]
-    faults += [Fault(where, name, "missing", "Give it") for name in needed if name not in table]
-    return values
+def _fault(error: ErrorDetails) -> Fault:
+    """A fault of a paper's file in our words."""
+    *places, key = ("", *map(str, error["loc"]))
+    names = [name for name in places if name in _RECORDS]
+    numbers = [int(place) + 1 for place in (*places, key) if place.isdigit()]
+    where = ", ".join(f"{name} {number}" for name, number in zip(names[1:], numbers, strict=False))
+    if error["type"] == "unexpected_keyword_argument":
+        known = [_ALIASES.get(f.name, f.name) for f in fields(_RECORDS[names[-1]])]
+        return Fault(where or "[paper]", key, "unknown key", f"Valid: {', '.join(known)}")
+    found, fix = {
+        "missing": ("missing", "Give it"),
+        "tuple_type": ("no list of tables", f"Write [[{key}]]"),
+        "dataclass_type": ("no table", "Write its keys"),
+        "dict_type": ("no table", "Write { name = value }"),
+    }.get(error["type"], (f"found {error['input']!r}", error["msg"]))
+    return Fault(where or "[paper]", "" if key.isdigit() else key, found, fix)

@@ -13,7 +13,7 @@ from screwkin.errors import InputError
 from screwkin.gait.balance import soles_on_floor
 from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.papers.bench import Bench
-from screwkin.papers.measures_leg import compensated_of, map_of, sinking_of, zmp_lines
+from screwkin.papers.measures_leg import FINE, compensated_of, map_of, sinking_of, zmp_lines
 from screwkin.papers.measures_springs import trial_of
 from screwkin.report import balance, frames, maps, motion
 from screwkin.report.style import (
@@ -23,11 +23,11 @@ from screwkin.report.style import (
     SIDES,
     ZMP,
     Figure,
+    finished,
     legend_above,
     new_figure,
-    shade_swings,
     shown,
-    time_axis,
+    time_figure,
 )
 from screwkin.sim.measure import ZmpRecord
 
@@ -37,119 +37,100 @@ Drawing = Callable[..., Figure]
 def _of_walk(draw: Callable[..., Figure | None], **options: object) -> Drawing:
     """A report's picture of a walk's account as a drawing of a paper."""
 
-    def drawing(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
-        figure = draw(bench.account(gait, steps, robot), **options)
+    def drawing(bench: Bench, gait: str, steps: int | None = None) -> Figure:
+        figure = draw(bench.account(gait, steps), **options)
         if figure is None:
-            raise InputError(f"{bench.robot(robot).name} has no legs, so there are no joint angles to draw")
+            raise InputError(f"{bench.robot.name} has no legs, so there are no joint angles to draw")
         return figure
 
     drawing.__doc__ = draw.__doc__
     return drawing
 
 
-def walking(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
+def walking(bench: Bench, gait: str, steps: int | None = None) -> Figure:
     """Frames of the simulated walk."""
-    account = bench.account(gait, steps, robot)
+    account = bench.account(gait, steps)
     return frames.frames_of_run(account, bench.validation(account).run)
 
 
-def reach_maps(
-    bench: Bench, limb: str, heights: Sequence[float], resolution: float = 0.0025, robot: str = ""
-) -> Figure:
+def reach_maps(bench: Bench, limb: str, heights: Sequence[float], resolution: float = FINE) -> Figure:
     """What cuts the reach, and the inverse condition number, at several heights."""
-    places = [map_of(bench, limb, height, resolution, robot) for height in heights]
+    places = [map_of(bench, limb, height, resolution) for height in heights]
     most = max(float(np.nanmax(place.inverse_condition, initial=0.0)) for place in places)
-    return maps.workspace_overview(bench.robot(robot), places, most)
+    return maps.workspace_overview(bench.robot, places, most)
 
 
-def deflection_maps(
-    bench: Bench, limb: str, heights: Sequence[float], stiffness: float = 1.0, robot: str = ""
-) -> Figure:
+def deflection_maps(bench: Bench, limb: str, heights: Sequence[float], stiffness: float = 1.0) -> Figure:
     """Length of the deflection at several heights."""
-    sunk = [sinking_of(bench, limb, height, stiffness, "linear", 0.005, robot) for height in heights]
-    return maps.deflection_overview(bench.robot(robot), sunk)
+    sunk = [sinking_of(bench, limb, height, stiffness) for height in heights]
+    return maps.deflection_overview(bench.robot, sunk)
 
 
-def deflection_parts(
-    bench: Bench, limb: str, height: float, stiffness: float = 1.0, robot: str = ""
-) -> Figure:
+def deflection_parts(bench: Bench, limb: str, height: float, stiffness: float = 1.0) -> Figure:
     """Components of the deflection at a height."""
-    sunk = sinking_of(bench, limb, height, stiffness, "linear", 0.005, robot)
-    return maps.deflection_picture(bench.robot(robot), sunk)
+    sunk = sinking_of(bench, limb, height, stiffness)
+    return maps.deflection_picture(bench.robot, sunk)
 
 
-def preview(bench: Bench, gait: str, steps: int | None = None, robot: str = "") -> Figure:
+def preview(bench: Bench, gait: str, steps: int | None = None) -> Figure:
     """Wanted ZMP, that of the cart and of all links, and the CoM, along x and y."""
-    account = bench.account(gait, steps, robot)
-    wanted, cart, whole = zmp_lines(bench, gait, steps, robot)
-    figure, axes = new_figure(5.2, 2, sharex=True)
+    account = bench.account(gait, steps)
+    wanted, cart, whole = zmp_lines(bench, gait, steps)
+    time = account.trajectory.time
+    figure, axes = time_figure(account, 5.2, 2)
     for k, one in enumerate(axes):
-        shade_swings(one, account)
-        time = account.trajectory.time
         one.plot(time, 1e3 * cart[:, k], color=MEASURED, linewidth=3.0, alpha=0.6, label="ZMP of the cart")
         one.plot(time, 1e3 * wanted[:, k], color="#222222", linewidth=0.9, label="ZMP wanted")
         one.plot(time, 1e3 * whole[:, k], color=ZMP, linewidth=1.0, linestyle="--", label="ZMP of all links")
         one.plot(time, 1e3 * account.balance.com[:, k], color=SIDES[2], label="CoM")
         one.set_ylabel(f"{'xy'[k]} [mm]")
-    time_axis(axes[1], account)
-    legend_above(figure, list(axes), columns=6)
-    return figure
+    return finished(figure, account)
 
 
-def compensated_joints(bench: Bench, gait: str, limb: str, stiffness: float, robot: str = "") -> Figure:
+def compensated_joints(bench: Bench, gait: str, limb: str, stiffness: float) -> Figure:
     """Joint angles of a limb as planned, and what compensation adds to them."""
-    account = bench.account(gait, None, robot)
+    account = bench.account(gait)
     table, time = account.robot, account.trajectory.time
-    change = np.degrees(compensated_of(bench, gait, stiffness, "swing", robot).q - account.trajectory.q)
-    figure, (angle, added) = new_figure(5.2, 2, sharex=True)
+    change = np.degrees(compensated_of(bench, gait, stiffness).q - account.trajectory.q)
+    figure, (angle, added) = time_figure(account, 5.2, 2)
     for k, i in enumerate(table.path_to(table.limb(limb).link)):
         style = {"color": SIDES[k % len(SIDES)], "linestyle": LINES[k % 2], "linewidth": 1.2}
         name = shown(table.joint_names[i])
         angle.plot(time, np.degrees(account.trajectory.q[:, i]), label=name, **style)
         added.plot(time, change[:, i], label=name, **style)
-    for one in (angle, added):
-        shade_swings(one, account)
     angle.set_ylabel("intended [deg]")
     added.set_ylabel("added by compensation [deg]")
-    time_axis(added, account)
-    legend_above(figure, [angle], columns=4)
-    return figure
+    return finished(figure, account, columns=4)
 
 
-def commanded_foot(bench: Bench, gait: str, limb: str, stiffness: float, robot: str = "") -> Figure:
+def commanded_foot(bench: Bench, gait: str, limb: str, stiffness: float) -> Figure:
     """The foot seen from the waist along x, y and z, as planned and as compensation commands it."""
-    account = bench.account(gait, None, robot)
-    planned, commanded = _seen_from_waist(bench, gait, limb, stiffness, robot)
-    figure, axes = new_figure(6.0, 3, sharex=True)
+    account = bench.account(gait)
+    planned, commanded = _seen_from_waist(bench, gait, limb, stiffness)
+    figure, axes = time_figure(account, 6.0, 3)
     for k, one in enumerate(axes):
-        shade_swings(one, account)
         one.plot(account.trajectory.time, 1e3 * planned[:, k], color=PLAIN, label="intended")
         one.plot(account.trajectory.time, 1e3 * commanded[:, k], "--", color=SIDES[0], label="commanded")
         one.set_ylabel(f"{'xyz'[k]} [mm]")
-    time_axis(axes[-1], account)
-    legend_above(figure, [axes[0]])
-    return figure
+    return finished(figure, account)
 
 
-def compensated_foot(bench: Bench, gait: str, limb: str, stiffness: float, robot: str = "") -> Figure:
+def compensated_foot(bench: Bench, gait: str, limb: str, stiffness: float) -> Figure:
     """By how much compensation moves the commanded foot, seen from the waist."""
-    account = bench.account(gait, None, robot)
-    planned, commanded = _seen_from_waist(bench, gait, limb, stiffness, robot)
-    figure, axes = new_figure(3.0)
-    shade_swings(axes, account)
+    account = bench.account(gait)
+    planned, commanded = _seen_from_waist(bench, gait, limb, stiffness)
+    figure, axes = time_figure(account, 3.0)
     for k, colour in enumerate((SIDES[0], SIDES[1], PLAIN)):
         moved = 1e3 * (commanded - planned)[:, k]
         axes.plot(account.trajectory.time, moved, color=colour, label="xyz"[k], linestyle=LINES[k])
     axes.set_ylabel(f"{shown(account.robot.limb(limb).tip)} moved by [mm]")
-    time_axis(axes, account)
-    legend_above(figure, [axes])
-    return figure
+    return finished(figure, account)
 
 
-def _seen_from_waist(bench: Bench, gait: str, limb: str, stiffness: float, robot: str) -> list[Array]:
+def _seen_from_waist(bench: Bench, gait: str, limb: str, stiffness: float) -> list[Array]:
     """Places (T, 3) [m] of a limb's tip in the waist's frame, as planned and as commanded."""
-    account = bench.account(gait, None, robot)
-    commanded = compensated_of(bench, gait, stiffness, "swing", robot).q
+    account = bench.account(gait)
+    commanded = compensated_of(bench, gait, stiffness).q
     tip = account.robot.limb(limb).tip
     return [
         as_array(pose_in_base(account.robot, link_displacements(account.robot, unstack(q)), tip), (len(q),))[
@@ -159,47 +140,38 @@ def _seen_from_waist(bench: Bench, gait: str, limb: str, stiffness: float, robot
     ]
 
 
-def sprung_zmp(
-    bench: Bench, gait: str, treatments: Sequence[str], stiffness: float, robot: str = ""
-) -> Figure:
+def sprung_zmp(bench: Bench, gait: str, treatments: Sequence[str], stiffness: float) -> Figure:
     """ZMP against time of a walk on elastic joints, simulated: wanted, and with every treatment."""
-    account = bench.account(gait, None, robot)
-    wanted = zmp_lines(bench, gait, None, robot)[0]
-    figure, axes = new_figure(5.6, 2, sharex=True)
+    account = bench.account(gait)
+    wanted = zmp_lines(bench, gait)[0]
+    figure, axes = time_figure(account, 5.6, 2)
     for k, one in enumerate(axes):
-        shade_swings(one, account)
         for treatment, style in zip(treatments, _TREATED, strict=False):
-            trial, zmp = _run_of(bench, gait, treatment, stiffness, robot)
+            trial, zmp = _run_of(bench, gait, treatment, stiffness)
             one.plot(zmp.time, 1e3 * zmp.contact[:, k], label=_treated(trial), **style)
         one.plot(
             account.trajectory.time, 1e3 * wanted[:, k], color="#222222", linewidth=0.9, label="ZMP wanted"
         )
         one.set_ylabel(f"{'xy'[k]} [mm]")
-    time_axis(axes[1], account)
-    legend_above(figure, [axes[0]], columns=4)
-    return figure
+    return finished(figure, account, columns=4)
 
 
-def sprung_zmp_above(
-    bench: Bench, gait: str, treatments: Sequence[str], stiffness: float, robot: str = ""
-) -> Figure:
+def sprung_zmp_above(bench: Bench, gait: str, treatments: Sequence[str], stiffness: float) -> Figure:
     """The same from above, one panel for each treatment, with the soles where the plan puts them."""
-    account = bench.account(gait, None, robot)
+    account = bench.account(gait)
     trajectory = account.trajectory
     soles = soles_on_floor(account.robot, trajectory.feet, trajectory.T_world_tip)
-    wanted = zmp_lines(bench, gait, None, robot)[0]
-    figure, axes = new_figure(
-        0.8 + 1.55 * len(treatments), len(treatments), sharex=True, sharey=True, squeeze=False
-    )
-    for one, treatment, style in zip(axes[:, 0], treatments, _TREATED, strict=False):
+    wanted = zmp_lines(bench, gait)[0]
+    figure, _ = new_figure(0.8 + 1.55 * len(treatments), len(treatments), sharex=True, sharey=True)
+    for one, treatment, style in zip(figure.axes, treatments, _TREATED, strict=False):
         balance.draw_soles(one, account, soles)
-        trial, zmp = _run_of(bench, gait, treatment, stiffness, robot)
+        trial, zmp = _run_of(bench, gait, treatment, stiffness)
         one.plot(*zmp.contact.T, label=_treated(trial), **style)
         one.plot(*wanted.T, color="#222222", linewidth=0.9, label="ZMP wanted")
         one.set_aspect("equal")
         one.set_ylabel("y [m]")
-    axes[-1, 0].set_xlabel("x [m]")
-    legend_above(figure, list(axes[:, 0]), columns=3)
+    figure.axes[-1].set_xlabel("x [m]")
+    legend_above(figure, figure.axes, columns=3)
     return figure
 
 
@@ -211,8 +183,8 @@ _TREATED = (
 """Lines of a figure's treatments, in their order."""
 
 
-def _run_of(bench: Bench, gait: str, treatment: str, stiffness: float, robot: str) -> tuple[Trial, ZmpRecord]:
-    trial = trial_of(bench, gait, treatment, stiffness, robot=robot)
+def _run_of(bench: Bench, gait: str, treatment: str, stiffness: float) -> tuple[Trial, ZmpRecord]:
+    trial = trial_of(bench, gait, treatment, stiffness)
     if trial.zmp is None:
         raise InputError(f"the run with treatment {treatment} has no ZMP")
     return trial, trial.zmp

@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from screwkin.errors import InputError, UnknownNameError
+from screwkin.errors import InputError, one_of
 from screwkin.papers import measures_leg, measures_springs, measures_table, measures_walk
 
 Measure = Callable[..., Any]
@@ -58,9 +58,8 @@ def check_call(
     Raises:
         UnknownNameError, InputError: what is wrong; ``where`` says in which row.
     """
-    if name not in known:
-        raise UnknownNameError(f"{kind} of {where!r}", name, list(known))
-    parameters = list(inspect.signature(known[name]).parameters.values())[1:]
+    called = one_of(f"{kind} of {where!r}", name, known)
+    parameters = list(inspect.signature(called).parameters.values())[1:]
     names = [parameter.name for parameter in parameters]
     unknown = [one for one in given if one not in names]
     missing = [p.name for p in parameters if p.default is p.empty and p.name not in given]

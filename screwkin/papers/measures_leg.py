@@ -11,8 +11,8 @@ from screwkin.analysis.ik_study import IkRow, IkStudy, ik_study
 from screwkin.analysis.stiffness_maps import DeflectionMap, stiffness_maps
 from screwkin.analysis.workspace import WorkspaceMap, workspace
 from screwkin.compliance.stiffness import Method as Law
-from screwkin.errors import InputError, UnknownNameError
-from screwkin.gait.compensation import METHODS, Remaining, compensate, convergence
+from screwkin.errors import InputError, one_of
+from screwkin.gait.compensation import METHODS, compensate, convergence
 from screwkin.gait.footsteps import footholds
 from screwkin.gait.preview import follow_reference, preview_gains
 from screwkin.gait.preview_plan import zmp_reference
@@ -20,36 +20,31 @@ from screwkin.gait.stance import stance_of
 from screwkin.papers.bench import Bench
 from screwkin.trajectory import Trajectory
 
+POSES = 2000
+"""Random poses of the comparison of inverse kinematics."""
+FINE, COARSE = 0.0025, 0.005
+"""Grids of maps of the reach and of the deflection [m]."""
 
-def study_of(bench: Bench, limb: str, poses: int, robot: str = "") -> IkStudy:
+
+def study_of(bench: Bench, limb: str) -> IkStudy:
     """The comparison of inverse kinematics methods, computed once."""
-    table = bench.robot(robot)
-    return bench.once(("ik", table.name, limb, poses), lambda: ik_study(table, limb, poses))
+    return bench.once(("ik", limb), lambda: ik_study(bench.robot, limb, POSES))
 
 
-def ik_number(
-    bench: Bench, limb: str, method: str, key: str, data: str = "gait", poses: int = 2000, robot: str = ""
-) -> float:
+def ik_number(bench: Bench, limb: str, method: str, key: str, data: str = "gait") -> float:
     """A number of an inverse kinematics method: iterations, share solved or in limits, or seconds."""
-    return _number(_row(study_of(bench, limb, poses, robot), method, data), key)
+    return _number(_row(study_of(bench, limb), method, data), key)
 
 
-def ik_ratio(
-    bench: Bench, limb: str, methods: Sequence[str], key: str, poses: int = 2000, robot: str = ""
-) -> float:
+def ik_ratio(bench: Bench, limb: str, methods: Sequence[str], key: str) -> float:
     """How many times more the first method needs than the second, over the walk."""
-    study = study_of(bench, limb, poses, robot)
-    first, second = (_number(_row(study, method, "gait"), key) for method in methods)
+    first, second = (ik_number(bench, limb, method, key) for method in methods)
     return first / second
 
 
 def _row(study: IkStudy, method: str, data: str) -> IkRow:
-    for row in study.rows:
-        if (row.method, row.data) == (method, data):
-            return row
-    raise UnknownNameError(
-        "inverse kinematics method", method, list(dict.fromkeys(r.method for r in study.rows))
-    )
+    rows = {row.method: row for row in study.rows if row.data == data}
+    return one_of("inverse kinematics method", method, rows)
 
 
 def _number(row: IkRow, key: str) -> float:
@@ -61,107 +56,72 @@ def _number(row: IkRow, key: str) -> float:
     return value
 
 
-def map_of(bench: Bench, limb: str, height: float, resolution: float, robot: str = "") -> WorkspaceMap:
+def map_of(bench: Bench, limb: str, height: float, grid: float = FINE) -> WorkspaceMap:
     """The workspace of a limb at a height of the waist above its tip, computed once."""
-    table = bench.robot(robot)
-    key = ("workspace", table.name, limb, height, resolution)
-    return bench.once(key, lambda: workspace(table, limb, [height], resolution)[0])
+    key = ("workspace", limb, height, grid)
+    return bench.once(key, lambda: workspace(bench.robot, limb, [height], grid)[0])
 
 
-def reach(
-    bench: Bench, limb: str, height: float, key: str = "area", resolution: float = 0.0025, robot: str = ""
-) -> float:
+def reach(bench: Bench, limb: str, height: float, key: str = "area") -> float:
     """Area [m^2] that a limb reaches with its tip level, or the median condition number there."""
-    place = map_of(bench, limb, height, resolution, robot)
-    if key not in ("area", "median_condition"):
-        raise UnknownNameError("number of a workspace", key, ("area", "median_condition"))
-    return float(getattr(place, key))
+    place = map_of(bench, limb, height)
+    return float(getattr(place, one_of("number of a workspace", key, ("area", "median_condition"))))
 
 
-def cut_at(
-    bench: Bench, limb: str, height: float, at: Sequence[float], resolution: float = 0.0025, robot: str = ""
-) -> str:
+def cut_at(bench: Bench, limb: str, height: float, at: Sequence[float]) -> str:
     """What decides at a place [m] of the waist frame: reachable, out of reach, or the limit of a joint."""
-    place = map_of(bench, limb, height, resolution, robot)
+    place = map_of(bench, limb, height)
     i, j = (int(np.abs(axis - value).argmin()) for axis, value in zip((place.x, place.y), at, strict=True))
     return place.causes[int(place.cause[i, j])].replace("_", " ")
 
 
-def sinking_of(
-    bench: Bench, limb: str, height: float, stiffness: float, law: Law, resolution: float, robot: str = ""
-) -> DeflectionMap:
+def sinking_of(bench: Bench, limb: str, height: float, stiffness: float = 1.0) -> DeflectionMap:
     """Deflection of a tip all over its workspace, computed once."""
-    table = bench.robot(robot)
-    place = map_of(bench, limb, height, resolution, robot)
-    key = ("stiffness", table.name, limb, height, stiffness, law, resolution)
-    return bench.once(key, lambda: stiffness_maps(table, [place], stiffness, law)[0])
+    place = map_of(bench, limb, height, COARSE)
+    key = ("stiffness", limb, height, stiffness)
+    return bench.once(key, lambda: stiffness_maps(bench.robot, [place], stiffness)[0])
 
 
-def deflection(
-    bench: Bench,
-    limb: str,
-    height: float,
-    key: str,
-    stiffness: float = 1.0,
-    law: Law = "linear",
-    resolution: float = 0.005,
-    robot: str = "",
-) -> float | Array:
+def deflection(bench: Bench, limb: str, height: float, key: str, stiffness: float = 1.0) -> float | Array:
     """Deflection [m] of the swinging tip over its workspace, the other foot standing.
 
     ``key``: median or max of its length; x, y or z for the range (2,) of a component; least_at for the place
     (2,) with the smallest one.
     """
-    sunk = sinking_of(bench, limb, height, stiffness, law, resolution, robot)
+    sunk = sinking_of(bench, limb, height, stiffness)
     if key in ("median", "max"):
         return float(getattr(np, f"nan{key}")(sunk.magnitude))
     if key == "least_at":
         i, j = np.unravel_index(np.nanargmin(sunk.magnitude), sunk.magnitude.shape)
         return np.array([sunk.place.x[i], sunk.place.y[j]])
-    if key not in ("x", "y", "z"):
-        raise UnknownNameError(
-            "number of a deflection map", key, ("median", "max", "x", "y", "z", "least_at")
-        )
+    one_of("number of a deflection map", key, ("median", "max", "x", "y", "z", "least_at"))
     part = sunk.translation[..., "xyz".index(key)]
     return np.array([np.nanmin(part), np.nanmax(part)])
 
 
 def gains(bench: Bench, key: str, settings: Mapping[str, float]) -> float | Array:
     """Preview gains Ks or Kx (3,) for ``period``, ``com_height``, ``horizon``, and weights Qe, Qx, R."""
-    if key not in ("Ks", "Kx"):
-        raise UnknownNameError("preview gain", key, ("Ks", "Kx"))
-    value: float | Array = getattr(preview_gains(**settings), key)
+    value: float | Array = getattr(preview_gains(**settings), one_of("preview gain", key, ("Ks", "Kx")))
     return value
 
 
 def preview_tracking(
-    bench: Bench,
-    gait: str,
-    who: str,
-    com_height: float | None = None,
-    steps: int | None = None,
-    robot: str = "",
+    bench: Bench, gait: str, who: str, com_height: float | None = None, steps: int | None = None
 ) -> Array:
     """Largest |x| and |y| (2,) [m] between the wanted ZMP and that of the ``cart``, or of all ``links``.
 
     ``com_height`` [m] of the cart; default: the robot's.
     """
-    wanted, cart, whole = zmp_lines(bench, gait, steps, robot, com_height)
-    lines = {"cart": cart, "links": whole}
-    if who not in lines:
-        raise UnknownNameError("ZMP", who, list(lines))
-    return np.asarray(np.abs(lines[who] - wanted).max(axis=0))
+    wanted, cart, whole = zmp_lines(bench, gait, steps, com_height)
+    line = one_of("ZMP", who, {"cart": cart, "links": whole})
+    return np.asarray(np.abs(line - wanted).max(axis=0))
 
 
 def zmp_lines(
-    bench: Bench,
-    gait: str,
-    steps: int | None = None,
-    robot: str = "",
-    com_height: float | None = None,
+    bench: Bench, gait: str, steps: int | None = None, com_height: float | None = None
 ) -> tuple[Array, Array, Array]:
     """ZMP (T, 2) [m] of a preview gait: wanted, of the cart that follows it, and of all links."""
-    account = bench.account(gait, steps, robot)
+    account = bench.account(gait, steps)
     plan, stance = bench.gait(gait), stance_of(account.robot)
     count = plan.steps if steps is None else steps
     time = account.trajectory.time
@@ -172,31 +132,11 @@ def zmp_lines(
     return wanted, cart.zmp, account.balance.zmp
 
 
-def remaining_of(
-    bench: Bench, gait: str, method: str, model: Law, stiffness: float, passes: int, robot: str = ""
-) -> tuple[Remaining, ...]:
-    """The residual after every pass of a compensation, computed once."""
-    account = bench.account(gait, None, robot)
-    chosen = next((known for known in METHODS if known == method), None)
-    if chosen is None:
-        raise UnknownNameError("compensation", method, METHODS)
-    key = ("remaining", account.trajectory.sha256, method, model, stiffness, passes)
-    return bench.once(
-        key,
-        lambda: convergence(account.robot, account.trajectory, stiffness, passes, chosen, model),
-    )
-
-
-def compensated_of(
-    bench: Bench, gait: str, stiffness: float, method: str = "swing", robot: str = ""
-) -> Trajectory:
-    """The walk with compensated commands."""
-    account = bench.account(gait, None, robot)
-    chosen = next((known for known in METHODS if known == method), None)
-    if chosen is None:
-        raise UnknownNameError("compensation", method, METHODS)
-    key = ("compensated", account.trajectory.sha256, method, stiffness)
-    return bench.once(key, lambda: compensate(account.robot, account.trajectory, stiffness, chosen))
+def compensated_of(bench: Bench, gait: str, stiffness: float) -> Trajectory:
+    """The walk with commands whose swing foot is compensated."""
+    account = bench.account(gait)
+    key = ("compensated", account.trajectory.sha256, stiffness)
+    return bench.once(key, lambda: compensate(account.robot, account.trajectory, stiffness, "swing"))
 
 
 def compensation(
@@ -207,13 +147,16 @@ def compensation(
     model: Law = "nonlinear",
     stiffness: float = 60.0,
     passes: int = 1,
-    robot: str = "",
 ) -> float:
     """Swing-foot error [m] against the nonlinear equilibrium before and after, or the share removed.
 
     ``key`` is such as ``before x``, ``after z``, ``removed y``, or ``after norm``.
     """
-    rows = remaining_of(bench, gait, method, model, stiffness, passes, robot)
+    account, chosen = bench.account(gait), one_of("compensation", method, METHODS)
+    rows = bench.once(
+        ("remaining", account.trajectory.sha256, method, model, stiffness, passes),
+        lambda: convergence(account.robot, account.trajectory, stiffness, passes, chosen, model),
+    )
     what, _, part = key.partition(" ")
     if what not in ("before", "after", "removed") or part not in ("x", "y", "z", "norm"):
         raise InputError(

@@ -10,7 +10,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import UNTURNED, Pose, Vector, as_array, vector_from_array
 from screwkin.analysis.chains import by_screws, chains_of
 from screwkin.analysis.compare import random_positions
-from screwkin.errors import InputError, UnknownNameError
+from screwkin.errors import InputError, one_of
 from screwkin.kinematics.positions import screws_in
 from screwkin.model.dh import DHRow
 from screwkin.model.robot import Robot
@@ -31,75 +31,71 @@ MECHANISM = (
 )
 
 
-def mass(bench: Bench, link: str = "", robot: str = "") -> float:
+def mass(bench: Bench, link: str = "") -> float:
     """Mass [kg] of a link, or of the whole robot."""
-    table = bench.robot(robot)
+    table = bench.robot
     return float(table.link(link).mass if link else table.mass)
 
 
-def link_center(bench: Bench, link: str, robot: str = "") -> Array:
+def link_center(bench: Bench, link: str) -> Array:
     """CoM (3,) [m] of a link in the zero pose."""
-    return _vector(bench.robot(robot).link(link).com)
+    return _vector(bench.robot.link(link).com)
 
 
-def middle_of_link(bench: Bench, link: str, between: Sequence[str], robot: str = "") -> float:
+def middle_of_link(bench: Bench, link: str, between: Sequence[str]) -> float:
     """Distance [m] of a link's CoM from the middle between two places."""
-    return float(np.linalg.norm(link_center(bench, link, robot) - _middle(bench.robot(robot), between)))
+    return float(np.linalg.norm(link_center(bench, link) - _middle(bench.robot, between)))
 
 
-def zero_pose_place(bench: Bench, at: Sequence[str], seen_from: Sequence[str] = (), robot: str = "") -> Array:
+def zero_pose_place(bench: Bench, at: Sequence[str], seen_from: Sequence[str] = ()) -> Array:
     """Place (3,) [m] of a joint's axis point or a tip in the zero pose, or the middle between several.
 
     Seen from the base origin, or from the middle between other places.
     """
-    table = bench.robot(robot)
+    table = bench.robot
     return _middle(table, at) - (_middle(table, seen_from) if seen_from else 0.0)
 
 
-def zero_pose_distance(bench: Bench, between: Sequence[str], along: str = "", robot: str = "") -> float:
+def zero_pose_distance(bench: Bench, between: Sequence[str], along: str = "") -> float:
     """Distance [m] of two places in the zero pose, or of their coordinates along x, y or z."""
-    first, second = (_place(bench.robot(robot), name) for name in between)
+    first, second = (_place(bench.robot, name) for name in between)
     gap = second - first
     return float(abs(gap["xyz".index(along)]) if along else np.linalg.norm(gap))
 
 
-def axis(bench: Bench, joint: str, robot: str = "") -> Array:
+def axis(bench: Bench, joint: str) -> Array:
     """Direction s (3,) of a joint's axis in the zero pose."""
-    return _vector(bench.robot(robot).joint(joint).screw.s)
+    return _vector(bench.robot.joint(joint).screw.s)
 
 
-def limits(bench: Bench, joint: str, robot: str = "") -> Array:
+def limits(bench: Bench, joint: str) -> Array:
     """Lower and upper limit (2,) of a joint [rad or m]."""
-    one = bench.robot(robot).joint(joint)
+    one = bench.robot.joint(joint)
     return np.array([one.lower, one.upper])
 
 
-def sole(bench: Bench, limb: str, robot: str = "") -> Array:
+def sole(bench: Bench, limb: str) -> Array:
     """Length and width (2,) of a sole [m]."""
-    for one in bench.robot(robot).soles:
-        if one.limb == limb:
-            return np.asarray(np.ptp([_vector(corner)[:2] for corner in one.corners], axis=0))
-    raise UnknownNameError("sole", limb, [one.limb for one in bench.robot(robot).soles])
+    chosen = one_of("sole", limb, {one.limb: one for one in bench.robot.soles})
+    return np.asarray(np.ptp([_vector(corner)[:2] for corner in chosen.corners], axis=0))
 
 
-def size(bench: Bench, along: str = "xyz", link: str = "", robot: str = "") -> Array:
+def size(bench: Bench, along: str = "xyz", link: str = "") -> Array:
     """Length, width and height (3,) [m] of the boxes of a link or of all, or those named by letters."""
-    table = bench.robot(robot)
+    table = bench.robot
     boxes = [box for one in ([table.link(link)] if link else table.links) for box in one.boxes]
     ends = [_vector(box.center) + sign * _vector(box.size) / 2 for box in boxes for sign in (-1, 1)]
     return np.asarray(np.ptp(ends, axis=0)[["xyz".index(letter) for letter in along]])
 
 
-def reference_error(bench: Bench, limb: str, reference: Sequence[str], robot: str = "") -> float:
+def reference_error(bench: Bench, limb: str, reference: Sequence[str]) -> float:
     """Largest difference of a tip's pose when its screws are expressed in another frame [1 and m].
 
     The frame stands in the middle between two places, with the axes of the base; the pose is
     A_base,reference times the successive displacements there times A_reference,tip.
     """
-    table = bench.robot(robot)
-    chain = next((one for one in chains_of(table) if one.name == limb), None)
-    if chain is None:
-        raise UnknownNameError("limb", limb, [one.name for one in table.limbs])
+    table = bench.robot
+    chain = one_of("limb", limb, {one.name: one for one in chains_of(table)})
     there = Pose(UNTURNED, vector_from_array(_middle(table, reference)))
     moved = screws_in(there, chain.screws)
     q = random_positions(table, 1000, np.random.default_rng(0))
@@ -111,17 +107,16 @@ def reference_error(bench: Bench, limb: str, reference: Sequence[str], robot: st
 
 def mechanism(bench: Bench, key: str, robot: str = "") -> float | Sequence[float]:
     """A count of the closed mechanism, or how many names a list of it holds."""
-    if key not in MECHANISM:
-        raise UnknownNameError("fact of a mechanism", key, MECHANISM)
+    one_of("fact of a mechanism", key, MECHANISM)
     value = bench.facts(robot).to_dict()[key]
     listed = key in ("primary", "secondary")
     counted: float | Sequence[float] = len(value) if listed else value
     return counted
 
 
-def comparison(bench: Bench, key: str, part: str = "", robot: str = "") -> float:
+def comparison(bench: Bench, key: str, part: str = "") -> float:
     """A number of the comparison of screws with DH tables."""
-    value = bench.comparison(robot).to_dict().get(key)
+    value = bench.comparison.to_dict().get(key)
     if part and isinstance(value, dict):
         for name in part.split("."):
             value = value[name]
@@ -130,23 +125,21 @@ def comparison(bench: Bench, key: str, part: str = "", robot: str = "") -> float
     return value
 
 
-def dh_angles(bench: Bench, joint: str, robot: str = "") -> Array:
+def dh_angles(bench: Bench, joint: str) -> Array:
     """Angles alpha and offset (2,) [rad] of a joint in the DH table beside the robot's file."""
-    row = _dh_row(bench.robot(robot), joint)
+    row = _dh_row(bench.robot, joint)
     return np.array([row.alpha, row.offset])
 
 
-def dh_lengths(bench: Bench, joint: str, robot: str = "") -> Array:
+def dh_lengths(bench: Bench, joint: str) -> Array:
     """Lengths a and d (2,) [m] of a joint in the DH table beside the robot's file."""
-    row = _dh_row(bench.robot(robot), joint)
+    row = _dh_row(bench.robot, joint)
     return np.array([row.a, row.d])
 
 
 def _dh_row(robot: Robot, joint: str) -> DHRow:
     rows = {row.joint: row for chain in chains_of(robot) for row in chain.table.rows}
-    if joint not in rows:
-        raise UnknownNameError("joint of a DH table", joint, list(rows))
-    return rows[joint]
+    return one_of("joint of a DH table", joint, rows)
 
 
 def _vector(v: Vector) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.analysis.account import Account
-from screwkin.errors import InputError, UnknownNameError
+from screwkin.errors import InputError, one_of
 from screwkin.papers.bench import Bench
 
 Changes = Mapping[str, str | float] | None
@@ -26,7 +26,6 @@ def key_points(
     seen_from: str = "step",
     steps: int = 6,
     changes: Changes = None,
-    robot: str = "",
 ) -> Array:
     """Coordinates (k,) [m] of a body at fractions of a step.
 
@@ -42,9 +41,8 @@ def key_points(
             does not turn.
         steps: of the walk.
         changes: of the gait's parameters.
-        robot: default the paper's.
     """
-    account = bench.account(gait, steps, robot, changes)
+    account = bench.account(gait, steps, changes)
     k = AXES.index(along)
     rows = _rows(account, step, at)
     value = _path(account, body)[:, k]
@@ -59,35 +57,29 @@ def key_points(
     return np.asarray((value - base)[rows] - float(offset))
 
 
-def feet_apart(
-    bench: Bench, gait: str, step: int, steps: int = 6, changes: Changes = None, robot: str = ""
-) -> float:
+def feet_apart(bench: Bench, gait: str, step: int, steps: int = 6, changes: Changes = None) -> float:
     """Distance [m] of the feet along x when a step begins."""
-    account = bench.account(gait, steps, robot, changes)
+    account = bench.account(gait, steps, changes)
     (row,) = _rows(account, step, [0.0])
     return float(np.ptp([_path(account, foot)[row, 0] for foot in account.trajectory.feet]))
 
 
-def swing_height(bench: Bench, gait: str, foot: str, steps: int | None = None, robot: str = "") -> float:
+def swing_height(bench: Bench, gait: str, foot: str, steps: int | None = None) -> float:
     """How high a foot is lifted [m]."""
-    return float(_path(bench.account(gait, steps, robot), foot)[:, 2].max())
+    return float(_path(bench.account(gait, steps), foot)[:, 2].max())
 
 
 def balance_number(
-    bench: Bench, key: str, gait: str, steps: int | None = None, changes: Changes = None, robot: str = ""
+    bench: Bench, key: str, gait: str, steps: int | None = None, changes: Changes = None
 ) -> float:
     """A number of a walk's balance: see ``BALANCE``; lengths in m."""
-    if key not in BALANCE:
-        raise UnknownNameError("fact of a balance", key, list(BALANCE))
-    value = BALANCE[key](bench.account(gait, steps, robot, changes))
+    value = one_of("fact of a balance", key, BALANCE)(bench.account(gait, steps, changes))
     return value if isinstance(value, int) else float(value)
 
 
-def spike_phases(
-    bench: Bench, gait: str, steps: int | None = None, changes: Changes = None, robot: str = ""
-) -> str:
+def spike_phases(bench: Bench, gait: str, steps: int | None = None, changes: Changes = None) -> str:
     """When spikes of |GCoM - ZMP| stand, in fractions of a step's duration, start and stop left out."""
-    account = bench.account(gait, steps, robot, changes)
+    account = bench.account(gait, steps, changes)
     ends = np.array(account.boundaries)
     inner = [spike.time for spike in account.balance.spikes if ends[1] <= spike.time < ends[-2]]
     if not inner:
@@ -107,13 +99,12 @@ def simulated(
     steps: int | None = None,
     changes: Changes = None,
     sole_stiffness: float | None = None,
-    robot: str = "",
 ) -> float | str:
     """What the simulator says of a walk; lengths as in the verdict, truth as yes or no.
 
     Soles are rigid unless ``sole_stiffness`` [N/m] of every point of contact is given.
     """
-    account = bench.account(gait, steps, robot, changes)
+    account = bench.account(gait, steps, changes)
     verdict = bench.validation(account, sole_stiffness).to_dict()
     if key == "fell_at" and verdict[key] is None:
         return "does not fall"
@@ -137,9 +128,7 @@ def _rows(account: Account, step: int, at: Sequence[float]) -> list[int]:
 def _path(account: Account, body: str) -> Array:
     """Places (T, 3) of a body in the world."""
     trajectory = account.trajectory
-    T = trajectory.T_world_base if body == "base" else trajectory.T_world_tip.get(body)
-    if T is None:
-        raise UnknownNameError("body", body, ["base", *trajectory.T_world_tip])
+    T = one_of("body", body, {"base": trajectory.T_world_base, **trajectory.T_world_tip})
     return np.asarray(T[:, :3, 3])
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import io
 import re
 from collections.abc import Callable, Sequence
@@ -18,7 +17,8 @@ from screwkin.papers.bench import Bench
 from screwkin.papers.claims import Paper, Picture
 from screwkin.papers.drawings import DRAWINGS
 from screwkin.papers.measures import check_call
-from screwkin.papers.reproduce import MARKS, ClaimResult, Measured, Reproduction, written
+from screwkin.papers.reproduce import Measured, Reproduction
+from screwkin.report.page import figure_html
 from screwkin.report.style import DPI, styled
 
 _COLOURS = 256
@@ -99,40 +99,10 @@ def write_pages(
         OutputError: a page cannot be written.
     """
     pages = folder / "README.md", folder / "report.html"
-    for path, text in zip(
-        pages,
-        (
-            _markdown(result, pictures, command, versions),
-            _html(result, pictures, command, versions),
-        ),
-        strict=True,
-    ):
+    for path, text in zip(pages, (_markdown, _html), strict=True):
         with atomic_write(path) as file:
-            file.write(text)
+            file.write(text(result, pictures, command, versions))
     return pages
-
-
-def _rows(measured: Measured) -> list[tuple[str, str, str, str, str]]:
-    """Item, paper, ours, mark and note of every line, without the section's place."""
-    start = f"{measured.section.place}: "
-    return [
-        (
-            line.item.removeprefix(start),
-            written(line.paper) or "–",
-            _ours(line),
-            MARKS[line.agrees],
-            line.note,
-        )
-        for line in measured.lines
-    ]
-
-
-def _ours(line: ClaimResult) -> str:
-    return written(line.ours, line.form) or "–"
-
-
-def _title(measured: Measured) -> str:
-    return f"{measured.section.place}: {measured.section.title}"
 
 
 def _markdown(result: Reproduction, pictures: Sequence[Sequence[Drawn]], command: str, versions: str) -> str:
@@ -140,9 +110,9 @@ def _markdown(result: Reproduction, pictures: Sequence[Sequence[Drawn]], command
     parts = [f"# {paper.title}", f"*{paper.source}*", paper.text, result.summary]
     parts += [f"Made by\n\n```\n{command}\n```\n\nwith {versions}."]
     for measured, drawn in zip(result.sections, pictures, strict=True):
-        parts += [f"## {_title(measured)}", measured.section.text]
+        parts += [f"## {measured.title}", measured.section.text]
         if measured.lines:
-            rows = [_HEAD, ("---",) * len(_HEAD), *_rows(measured)]
+            rows = [_HEAD, ("---",) * len(_HEAD), *measured.cells]
             parts.append("\n".join("| " + " | ".join(map(_cell, row)) + " |" for row in rows))
         parts += [f"![{_plain(one.caption)}]({one.path.name})\n\n*{one.caption}*" for one in drawn]
     return "\n\n".join(part for part in parts if part) + "\n"
@@ -167,16 +137,12 @@ def _html(result: Reproduction, pictures: Sequence[Sequence[Drawn]], command: st
         f'<p class="soft">{escape(versions)}</p>',
     ]
     for measured, drawn in zip(result.sections, pictures, strict=True):
-        body.append(f"<h2>{_text(_title(measured))}</h2>")
+        body.append(f"<h2>{_text(measured.title)}</h2>")
         if measured.section.text:
             body.append(f"<p>{_text(measured.section.text)}</p>")
         if measured.lines:
             body.append(_table(measured))
-        body += [
-            f'<figure><img alt="{escape(_plain(one.caption))}" src="{_embedded(one.path)}">'
-            f"<figcaption>{_text(one.caption)}</figcaption></figure>"
-            for one in drawn
-        ]
+        body += [figure_html(one.path, escape(_plain(one.caption)), _text(one.caption)) for one in drawn]
     return _PAGE.format(title=escape(paper.title), style=_style(), body="\n".join(body))
 
 
@@ -186,7 +152,7 @@ def _table(measured: Measured) -> str:
         f'<tr><td>{_text(item)}</td><td class="number">{_text(paper)}</td>'
         f'<td class="value">{_text(ours)}</td>'
         f'<td class="{mark or "soft"}">{mark}</td><td class="soft">{_text(note)}</td></tr>'
-        for item, paper, ours, mark, note in _rows(measured)
+        for item, paper, ours, mark, note in measured.cells
     ]
     return f'<div class="wide"><table><tr>{head}</tr>{"".join(rows)}</table></div>'
 
@@ -194,10 +160,6 @@ def _table(measured: Measured) -> str:
 def _text(text: str) -> str:
     """Text for HTML; words between back quotes as code."""
     return re.sub(r"`([^`]*)`", r"<code>\1</code>", escape(text))
-
-
-def _embedded(path: Path) -> str:
-    return f"data:image/png;base64,{base64.b64encode(path.read_bytes()).decode('ascii')}"
 
 
 def _style() -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -41,13 +41,7 @@ class ClaimResult:
 
     def to_dict(self) -> dict[str, Any]:
         """The row as JSON data."""
-        return {
-            "item": self.item,
-            "paper": self.paper,
-            "ours": self.ours,
-            "note": self.note,
-            "agrees": self.agrees,
-        }
+        return {key: value for key, value in asdict(self).items() if key != "form"}
 
 
 @dataclass(frozen=True)
@@ -56,6 +50,25 @@ class Measured:
 
     section: Section
     lines: tuple[ClaimResult, ...]
+
+    @property
+    def title(self) -> str:
+        """Place and title of the section."""
+        return f"{self.section.place}: {self.section.title}"
+
+    @property
+    def cells(self) -> list[tuple[str, str, str, str, str]]:
+        """Item, paper, ours, mark and note of every line, without the section's place."""
+        return [
+            (
+                line.item.removeprefix(f"{self.section.place}: "),
+                written(line.paper) or "–",
+                written(line.ours, line.form) or "–",
+                MARKS[line.agrees],
+                line.note,
+            )
+            for line in self.lines
+        ]
 
 
 @dataclass(frozen=True)

@@ -18,13 +18,15 @@ from screwkin.report.style import (
     ZMP,
     Axes,
     Figure,
+    finished,
     foot_colours,
     legend_above,
+    mark_steps,
     new_figure,
     shade_swings,
     shown,
     spans,
-    time_axis,
+    time_figure,
 )
 
 _AXES = ("x", "y")
@@ -57,7 +59,7 @@ def zmp_against_gcom(account: Account, axis: int) -> Figure:
     )
     place.plot(time, scale * balance.com[:, axis], color=GCOM, label="GCoM")
     place.plot(time, scale * balance.zmp[:, axis], color=ZMP, linewidth=1.2, label="ZMP")
-    _boundaries(place, account)
+    mark_steps(place, account)
     place.set_ylabel(f"{_AXES[axis]} of GCoM and ZMP [{unit}]")
     difference = 1e3 * (balance.zmp - balance.com[:, :2])[:, axis]
     shade_swings(apart, account)
@@ -65,9 +67,7 @@ def zmp_against_gcom(account: Account, axis: int) -> Figure:
     apart.axhline(0.0, color="#999999", linewidth=0.7)
     _label_spikes(apart, balance.spikes, time, difference)
     apart.set_ylabel("ZMP - GCoM [mm]")
-    time_axis(apart, account)
-    legend_above(figure, [place, apart], columns=4)
-    return figure
+    return finished(figure, account, columns=4)
 
 
 def _extent(account: Account, axis: int) -> tuple[Array, Array]:
@@ -78,16 +78,10 @@ def _extent(account: Account, axis: int) -> tuple[Array, Array]:
     return low, high
 
 
-def _boundaries(axes: Axes, account: Account) -> None:
-    for boundary in account.boundaries[1:-1]:
-        axes.axvline(boundary, color="#BBBBBB", linewidth=0.6, zorder=0.6)
-
-
 def margin_over_time(account: Account) -> Figure:
     """The ZMP's margin, and its distance from the GCoM with the spikes and their times."""
     time, balance = account.trajectory.time, account.balance
-    figure, (inside, distance) = new_figure(4.6, 2, sharex=True)
-    shade_swings(inside, account)
+    figure, (inside, distance) = time_figure(account, 4.6, 2)
     margin = 1e3 * balance.margin
     inside.plot(time, margin, color=ZMP, label="margin of the ZMP")
     inside.axhline(0.0, color="#B00020", linewidth=1.0, label="border of the support polygon")
@@ -106,16 +100,13 @@ def margin_over_time(account: Account) -> Figure:
     )
     inside.set_ylim(min(0.0, margin.min()) - 0.16 * np.ptp(margin), None)
     inside.set_ylabel("margin [mm]")
-    shade_swings(distance, account)
     apart = 1e3 * balance.distance
     distance.plot(time, apart, color=PLAIN, linewidth=1.1, label="|GCoM - ZMP|")
     threshold = 2.0 * float(np.median(apart))
     distance.axhline(threshold, color=PLAIN, linewidth=0.8, linestyle=":", label="twice its median")
     _label_spikes(distance, balance.spikes, time, apart)
     distance.set_ylabel("|GCoM - ZMP| [mm]")
-    time_axis(distance, account)
-    legend_above(figure, [inside, distance], columns=4)
-    return figure
+    return finished(figure, account, columns=4)
 
 
 def _label_spikes(axes: Axes, spikes: Sequence[Spike], time: Array, value: Array) -> None:
@@ -198,13 +189,11 @@ def singular_values_over_time(account: Account) -> Figure | None:
         return None
     colours = {limb.name: limb.kind for limb in account.robot.limbs}
     figure, axes = new_figure(2.8)
-    _boundaries(axes, account)
+    mark_steps(axes, account)
     for k, (name, sigma) in enumerate(account.sigma.items()):
         style = "--" if colours.get(name) == "arm" else "-"
         axes.plot(account.trajectory.time, sigma, color=SIDES[k % 2], linestyle=style, label=shown(name))
     axes.axhline(NEAR, color="#B00020", linewidth=0.9, label="near singular below")
     axes.set_ylim(bottom=0.0)
     axes.set_ylabel("least singular value [1]")
-    time_axis(axes, account)
-    legend_above(figure, [axes])
-    return figure
+    return finished(figure, account)

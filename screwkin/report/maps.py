@@ -150,56 +150,37 @@ def _panels(rows: int, columns: int, height: float, width: float = WIDTH) -> tup
     return figure, figure.subplots(rows, columns, sharex=True, sharey=True)
 
 
-def _extent(place: WorkspaceMap) -> tuple[float, float, float, float]:
+def _extent(place: WorkspaceMap) -> tuple[float, ...]:
     """Edges of the cells around the outer points [mm]."""
     half = place.resolution / 2
-    return (
-        1e3 * (place.x[0] - half),
-        1e3 * (place.x[-1] + half),
-        1e3 * (place.y[0] - half),
-        1e3 * (place.y[-1] + half),
-    )
+    edges = (place.x[0] - half, place.x[-1] + half, place.y[0] - half, place.y[-1] + half)
+    return tuple(1e3 * float(edge) for edge in edges)
 
 
 def _shade(axis: Axes, place: WorkspaceMap, values: Array, colours: str, scale: tuple[float, float]) -> Any:
     """Values as colours, forward to the right and left upwards; an outline where the reach ends."""
-    axis.set_facecolor("#F0F0F2")
-    shade = axis.imshow(
-        np.ma.masked_invalid(values.T),
-        origin="lower",
-        extent=_extent(place),
-        cmap=colours,
-        vmin=scale[0],
-        vmax=scale[1],
-        interpolation="nearest",
-        aspect="equal",
-    )
-    _outline(axis, place)
-    return shade
+    low, high = scale
+    return _image(axis, place, np.ma.masked_invalid(values), "#F0F0F2", cmap=colours, vmin=low, vmax=high)
 
 
 def _draw_causes(axis: Axes, place: WorkspaceMap) -> None:
     from matplotlib.colors import ListedColormap
 
     colours = cause_colours(place)
-    axis.set_facecolor(BEYOND)
-    axis.imshow(
-        place.cause.T,
-        origin="lower",
-        extent=_extent(place),
-        cmap=ListedColormap([colours[name] for name in place.causes]),
-        vmin=-0.5,
-        vmax=len(place.causes) - 0.5,
-        interpolation="nearest",
-        aspect="equal",
-    )
-    _outline(axis, place)
+    last = len(place.causes) - 0.5
+    hues = ListedColormap([colours[name] for name in place.causes])
+    _image(axis, place, place.cause, BEYOND, cmap=hues, vmin=-0.5, vmax=last)
 
 
-def _outline(axis: Axes, place: WorkspaceMap) -> None:
+def _image(axis: Axes, place: WorkspaceMap, values: Array, beyond: str, **colours: Any) -> Any:
+    """Values over the grid, and an outline where the reach ends."""
+    axis.set_facecolor(beyond)
+    options = {"origin": "lower", "interpolation": "nearest", "aspect": "equal"}
+    image = axis.imshow(values.T, extent=_extent(place), **options, **colours)
     seen = place.reachable.astype(float)
     if 0 < seen.sum() < seen.size and min(seen.shape) > 1:
         axis.contour(1e3 * place.x, 1e3 * place.y, seen.T, levels=[0.5], colors="#222222", linewidths=0.7)
+    return image
 
 
 def _surroundings(

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from screwkin.analysis.account import Account
 from screwkin.report.style import (
     LINES,
     WAIST,
+    Axes,
     Figure,
+    finished,
     foot_colours,
-    legend_above,
-    new_figure,
-    shade_swings,
     shown,
-    time_axis,
+    time_figure,
 )
 
 AXES = ("x", "y", "z")
@@ -26,61 +27,47 @@ def feet_along_x(account: Account) -> Figure:
     T = account.trajectory.T_world_tip
     sideways = any(np.ptp(T[foot][:, 1, 3]) > _STILL for foot in account.trajectory.feet)
     axes_shown = (0, 1) if sideways else (0,)
-    figure, axes = new_figure(1.2 + 1.9 * len(axes_shown), len(axes_shown), sharex=True, squeeze=False)
-    for axis, one in zip(axes_shown, axes[:, 0], strict=True):
+    figure, _ = time_figure(account, 1.2 + 1.9 * len(axes_shown), len(axes_shown))
+    for axis, one in zip(axes_shown, figure.axes, strict=True):
         _feet(account, one, axis, 1.0)
         one.set_ylabel(f"{AXES[axis]} of the feet [m]")
-    time_axis(axes[-1, 0], account)
-    legend_above(figure, list(axes[:, 0]))
-    return figure
+    return finished(figure, account)
 
 
 def feet_along_z(account: Account) -> Figure:
     """Height of the feet against time."""
-    figure, axes = new_figure(2.8)
+    figure, axes = time_figure(account, 2.8)
     _feet(account, axes, 2, 1e3)
     axes.set_ylabel("height of the feet [mm]")
     axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
-    time_axis(axes, account)
-    legend_above(figure, [axes])
-    return figure
+    return finished(figure, account)
 
 
-def _feet(account: Account, axes: object, axis: int, scale: float) -> None:
-    shade_swings(axes, account)
+def _feet(account: Account, axes: Axes, axis: int, scale: float, **style: Any) -> None:
     for foot, colour in foot_colours(account).items():
         value = scale * account.trajectory.T_world_tip[foot][:, axis, 3]
-        axes.plot(account.trajectory.time, value, color=colour, label=shown(foot))  # type: ignore[attr-defined]
+        axes.plot(account.trajectory.time, value, color=colour, label=shown(foot), **style)
 
 
 def waist_along_x(account: Account) -> Figure:
     """The waist against time along x, and its speed."""
     trajectory = account.trajectory
-    figure, (place, speed) = new_figure(3.9, 2, sharex=True, height_ratios=(3, 2))
-    shade_swings(place, account)
+    figure, (place, speed) = time_figure(account, 3.9, 2, height_ratios=(3, 2))
     place.plot(trajectory.time, trajectory.T_world_base[:, 0, 3], color=WAIST, label="waist")
     place.set_ylabel("x of the waist [m]")
-    shade_swings(speed, account)
     speed.plot(trajectory.time, 1e3 * trajectory.base_twist[:, 3], color=WAIST, linewidth=1.1)
     speed.set_ylabel("its speed [mm/s]")
-    time_axis(speed, account)
-    legend_above(figure, [place])
-    return figure
+    return finished(figure, account)
 
 
 def waist_along_y(account: Account) -> Figure:
     """The waist's sway against time, with the feet between which it sways."""
     trajectory = account.trajectory
-    figure, axes = new_figure(2.8)
-    shade_swings(axes, account)
-    for foot, colour in foot_colours(account).items():
-        y = 1e3 * trajectory.T_world_tip[foot][:, 1, 3]
-        axes.plot(trajectory.time, y, color=colour, linewidth=1.0, linestyle="--", label=shown(foot))
+    figure, axes = time_figure(account, 2.8)
+    _feet(account, axes, 1, 1e3, linewidth=1.0, linestyle="--")
     axes.plot(trajectory.time, 1e3 * trajectory.T_world_base[:, 1, 3], color=WAIST, label="waist")
     axes.set_ylabel("y of waist and feet [mm]")
-    time_axis(axes, account)
-    legend_above(figure, [axes])
-    return figure
+    return finished(figure, account)
 
 
 def joint_angles(account: Account, kind: str = "leg") -> Figure | None:
@@ -89,9 +76,8 @@ def joint_angles(account: Account, kind: str = "leg") -> Figure | None:
     limbs = [limb for limb in robot.limbs if limb.kind == kind]
     if not limbs:
         return None
-    figure, axes = new_figure(0.9 + 2.3 * len(limbs), len(limbs), sharex=True, sharey=True, squeeze=False)
-    for limb, one in zip(limbs, axes[:, 0], strict=True):
-        shade_swings(one, account)
+    figure, _ = time_figure(account, 0.9 + 2.3 * len(limbs), len(limbs), sharey=True)
+    for limb, one in zip(limbs, figure.axes, strict=True):
         joints = robot.path_to(limb.link)
         common = common_prefix([robot.joints[i].name for i in joints])
         for k, i in enumerate(joints):
@@ -100,9 +86,7 @@ def joint_angles(account: Account, kind: str = "leg") -> Figure | None:
             name = shown(robot.joints[i].name[len(common) :])
             one.plot(trajectory.time, value, color=HUES[k % len(HUES)], linestyle=LINES[k % 2], label=name)
         one.set_ylabel(f"{shown(limb.name)} [deg]")
-    time_axis(axes[-1, 0], account)
-    legend_above(figure, list(axes[:, 0]), columns=4)
-    return figure
+    return finished(figure, account, columns=4)
 
 
 HUES = ("#222222", "#56B4E9", "#CC79A7", "#009E73", "#E69F00", "#0072B2")

@@ -129,12 +129,16 @@ def _pictures(pictures: Sequence[Saved]) -> str:
     for section in dict.fromkeys(picture.section for picture in pictures):
         html.append(f"<h2>{escape(section)}</h2>")
         html += [
-            f'<figure><img alt="{escape(p.caption)}" src="{_embedded(p.path)}">'
-            f"<figcaption>{escape(p.caption)}</figcaption></figure>"
+            figure_html(p.path, escape(p.caption), escape(p.caption))
             for p in pictures
             if p.section == section
         ]
     return "\n".join(html)
+
+
+def figure_html(path: Path, name: str, caption: str) -> str:
+    """A picture embedded in a page, with its name for those who do not see it; both are HTML."""
+    return f'<figure><img alt="{name}" src="{_embedded(path)}"><figcaption>{caption}</figcaption></figure>'
 
 
 def _embedded(path: Path) -> str:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from screwkin.algebra.arrays import Array
 from screwkin.analysis.account import Account
 from screwkin.report.motion import HUES, common_prefix
-from screwkin.report.style import PLAIN, Figure, legend_above, new_figure, shade_swings, shown
+from screwkin.report.style import PLAIN, Axes, Figure, legend_above, shown, time_figure
 from screwkin.servo.log import PlayLog
 
 
@@ -17,9 +18,9 @@ def tracking(account: Account, log: PlayLog) -> Figure:
     start = log.start if np.isfinite(log.start) else 0.0
     time, read = log.time - start, log.read_at - start
     rows = len(legs) + 1
-    figure, axes = new_figure(0.9 + 2.3 * rows, rows, sharex=True, squeeze=False)
-    for limb, one in zip(legs, axes[:, 0], strict=False):
-        shade_swings(one, account)
+    figure, _ = time_figure(account, 0.9 + 2.3 * rows, rows)
+    *panels, last = figure.axes
+    for limb, one in zip(legs, panels, strict=True):
         joints = robot.path_to(limb.link)
         common = common_prefix([robot.joints[i].name for i in joints])
         for k, i in enumerate(joints):
@@ -30,20 +31,17 @@ def tracking(account: Account, log: PlayLog) -> Figure:
                 label=shown(robot.joints[i].name[len(common) :]),
             )  # fmt: skip
         one.set_ylabel(f"{shown(limb.name)} [deg]")
-    _errors(axes[-1, 0], account, log, read)
-    axes[-1, 0].set_xlim(time[0] if len(time) else 0.0, time[-1] if len(time) else 1.0)
-    axes[-1, 0].set_xlabel("time of the walk [s]; before 0 the soft start")
-    legend_above(figure, list(axes[:, 0]), columns=4)
+    _errors(last, log, read)
+    last.set_xlim(time[0] if len(time) else 0.0, time[-1] if len(time) else 1.0)
+    last.set_xlabel("time of the walk [s]; before 0 the soft start")
+    legend_above(figure, figure.axes, columns=4)
     return figure
 
 
-def _errors(
-    axes: Figure, account: Account, log: PlayLog, read: np.ndarray[tuple[int, ...], np.dtype[np.float64]]
-) -> None:
+def _errors(axes: Axes, log: PlayLog, read: Array) -> None:
     """How far each joint is from its last goal; the worst one by name."""
     error = np.degrees(np.abs(log.position - log.command))
     worst = int(np.argmax(np.nanmax(error, axis=0, initial=0.0)))
-    shade_swings(axes, account)
     for i, name in enumerate(log.joint_names):
         seen = np.isfinite(error[:, i])
         bold = i == worst

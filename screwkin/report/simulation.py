@@ -15,12 +15,12 @@ from screwkin.report.style import (
     ZMP,
     Axes,
     Figure,
+    finished,
     legend_above,
     limb_colours,
     new_figure,
-    shade_swings,
     shown,
-    time_axis,
+    time_figure,
 )
 
 _FALLEN = 30.0  # deg
@@ -33,12 +33,10 @@ def contact_zmp(account: Account, check: Validation) -> Figure | None:
     if not seen.any():
         return None
     time, contact, planned = record.time[seen], 1e3 * record.contact[seen], 1e3 * record.planned[seen]
-    figure, (side, difference) = new_figure(4.6, 2, sharex=True, height_ratios=(3, 2))
-    shade_swings(side, account)
+    figure, (side, difference) = time_figure(account, 4.6, 2, height_ratios=(3, 2))
     side.plot(time, planned[:, 1], color=ZMP, linewidth=2.6, alpha=0.45, label="planned")
     side.plot(time, contact[:, 1], color="#222222", linewidth=0.9, label="from contact forces")
     side.set_ylabel("y of the ZMP [mm]")
-    shade_swings(difference, account)
     difference.plot(
         time, (contact - planned)[:, 0], color=MEASURED, linewidth=1.0, label="difference along x"
     )
@@ -46,9 +44,7 @@ def contact_zmp(account: Account, check: Validation) -> Figure | None:
     difference.axhline(0.0, color="#999999", linewidth=0.7)
     difference.set_ylabel("contact - planned [mm]")
     _mark_fall(difference, check)
-    time_axis(difference, account)
-    legend_above(figure, [side, difference], columns=3)
-    return figure
+    return finished(figure, account, columns=3)
 
 
 def uprightness(account: Account, check: Validation) -> Figure:
@@ -56,15 +52,13 @@ def uprightness(account: Account, check: Validation) -> Figure:
     run = check.run
     time = run.time
     away = run.T_world_base[:, :2, 3] - run.planned_base[:, :2, 3]
-    figure, (tilt, off) = new_figure(3.9, 2, sharex=True)
-    shade_swings(tilt, account)
+    figure, (tilt, off) = time_figure(account, 3.9, 2)
     degrees = np.degrees(run.tilt)
     tilt.plot(time, degrees, color=WAIST, linewidth=1.0, label="tilt of the base")
     if check.fell:
         tilt.axhline(_FALLEN, color="#B00020", linewidth=1.0, label="fallen")
     tilt.set_ylim(bottom=0.0)
     tilt.set_ylabel("tilt [deg]")
-    shade_swings(off, account)
     off.plot(
         time, 1e3 * np.linalg.norm(away, axis=1), color=PLAIN, linewidth=1.0, label="distance from the plan"
     )

@@ -124,14 +124,30 @@ def shade_swings(axes: Axes, account: Account) -> None:
         for n, (begin, end) in enumerate(spans(~contact[:, k])):
             label = f"{shown(foot)} in the air" if n == 0 else None
             axes.axvspan(time[begin], time[end], color=colour, alpha=0.09, linewidth=0, label=label)
+    mark_steps(axes, account)
+
+
+def mark_steps(axes: Axes, account: Account) -> None:
+    """A line where every step but the first begins."""
     for boundary in account.boundaries[1:-1]:
         axes.axvline(boundary, color="#BBBBBB", linewidth=0.6, zorder=0.6)
 
 
-def time_axis(axes: Axes, account: Account) -> None:
-    """The axis of time, exactly as long as the motion."""
-    axes.set_xlim(account.trajectory.time[0], account.trajectory.time[-1])
-    axes.set_xlabel("time [s]")
+def time_figure(account: Account, height: float, rows: int = 1, **options: Any) -> tuple[Figure, Any]:
+    """A figure of stacked axes over the time of a motion, with its swings tinted, and its axes."""
+    figure, axes = new_figure(height, rows, sharex=True, **options)
+    for one in figure.axes:
+        shade_swings(one, account)
+    return figure, axes
+
+
+def finished(figure: Figure, account: Account, columns: int = 6) -> Figure:
+    """The figure with its axis of time, exactly as long as the motion, and one legend above."""
+    last, time = figure.axes[-1], account.trajectory.time
+    last.set_xlim(time[0], time[-1])
+    last.set_xlabel("time [s]")
+    legend_above(figure, figure.axes, columns)
+    return figure
 
 
 def spans(flags: Any) -> list[tuple[int, int]]:

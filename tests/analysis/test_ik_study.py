@@ -9,9 +9,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from screwkin.analysis import ik_others
-from screwkin.analysis.foot_path import FootPath, foot_from_waist
 from screwkin.analysis.ik_study import IkRow, fitting_entries, ik_study, measured
-from screwkin.analysis.ik_targets import random_targets, walking_path, walking_targets
+from screwkin.analysis.ik_targets import (
+    FootPath,
+    foot_from_waist,
+    random_targets,
+    walking_path,
+    walking_targets,
+)
 from screwkin.errors import InputError, UnknownNameError, UnreachableError
 from screwkin.ik.methods import solve_limb
 from screwkin.ik.numeric import IkSettings

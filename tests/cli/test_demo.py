@@ -101,3 +101,11 @@ def test_a_robot_that_cannot_walk_is_refused(cli, refused, tmp_path):
     assert called.code == 2
     assert "fixed base" in called.err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_robot_without_servos_has_nothing_to_play_to(tmp_path):
+    from screwkin.cli.demo import _played_to_virtual
+
+    play = _played_to_virtual(tmp_path / "trajectory.npz", "linkages/four-bar", tmp_path / "play.npz")
+    assert play["lines"] == ["The robot's table has no [servos]: nothing to play to."]
+    assert (play["packets"], play["servos"]) == (0, None)

@@ -6,15 +6,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from screwkin.algebra.se3 import UNTURNED, Pose, Rotation, Vector
-from screwkin.model.mirror import (
+from screwkin.model.mirror import swapped
+from screwkin.model.robot import Box, Inertia, Joint, Link, Robot
+from tests.laws.reflection import (
     reflected_joint,
     reflected_limb,
     reflected_link,
     reflected_sole,
-    swapped,
     turns_around,
 )
-from screwkin.model.robot import Box, Inertia, Joint, Link, Robot
 
 
 def slid(robot: Robot, shifts: Mapping[str, float]) -> Robot:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -13,7 +11,7 @@ from screwkin.algebra.quartic import circle_points, cube_root
 from screwkin.algebra.screws import Screw
 from screwkin.algebra.se3 import Twist, Vector, as_array, vector_from_array
 from screwkin.kinematics.serial_chain import SerialChain
-from screwkin.mechanism.limb_rates import doubtful, pose_rates, split_of
+from screwkin.mechanism.limb_rates import pose_rates, split_of
 from tests.kinematics.machines import point, unit
 
 
@@ -76,8 +74,6 @@ def test_splits_give_the_determinant_and_rates_of_the_whole_matrix(name, seed):
         np.testing.assert_allclose(J @ np.array(rates, dtype=float), as_array(wanted), atol=1e-11)
         scaled = J / np.r_[1, 1, 1, np.full(3, chain.length)][:, None]
         assert abs(volume) == pytest.approx(abs(np.linalg.det(scaled)), rel=1e-9)
-        least = np.linalg.svd(scaled, compute_uv=False)[-1]
-        assert doubtful(replace(chain), least) >= abs(volume) * 0.999, "no singular limb passes unseen"
 
 
 def test_cramer_s_rule_combines_three_vectors():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from screwkin.algebra.screws import INFINITE, Screw
 from screwkin.algebra.se3 import Pose, as_array, pose_from_array, vector_from_array
 from screwkin.model.dh import DHTable
+from screwkin.model.dh_derive import dh_from_screws
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 
@@ -114,3 +116,12 @@ def line(screw: Screw) -> Array:
 def lines(screws: Sequence[Screw]) -> Array:
     """Lines of a chain (n, 6)."""
     return np.array([line(screw) for screw in screws])
+
+
+def limb_table(robot, limb, convention="modified"):
+    """The derived table of a limb, with its names."""
+    chosen = robot.limb(limb)
+    joints = [robot.joints[i] for i in robot.path_to(chosen.link)]
+    names = [joint.name for joint in joints]
+    table = dh_from_screws([joint.screw for joint in joints], chosen.frame, convention, names)
+    return replace(table, name=chosen.name, tip=chosen.tip)

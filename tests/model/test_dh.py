@@ -14,10 +14,18 @@ from screwkin.algebra.se3 import IDENTITY, Pose, Vector, X, Y, Z, as_array, leav
 from screwkin.errors import InputError, ShapeError, UnknownNameError
 from screwkin.kinematics.positions import chain_jacobian, successive_displacement
 from screwkin.model.dh import DHRow, DHTable, dh_fk, dh_frames, dh_jacobian, screws_from_dh
-from screwkin.model.dh_derive import dh_from_limb, dh_from_screws, fixed_rows
+from screwkin.model.dh_derive import dh_from_screws, fixed_rows
 from screwkin.model.library import robot_names
 from screwkin.model.table import load_robot
-from tests.model.chains import fk_by_matrices, lines, next_axis, random_axis, random_chain, random_pose
+from tests.model.chains import (
+    fk_by_matrices,
+    limb_table,
+    lines,
+    next_axis,
+    random_axis,
+    random_chain,
+    random_pose,
+)
 
 CONVENTIONS = ("standard", "modified")
 RIGHT = math.pi / 2
@@ -142,7 +150,7 @@ def test_every_bundled_limb_keeps_its_lines_and_motion(name):
         moved = as_array(successive_displacement(screws, list(q.T), A_ref_k=limb.frame))
         J = np.array([as_array(column, (1000,)) for column in chain_jacobian(screws, list(q.T))])
         for convention in CONVENTIONS:
-            table = dh_from_limb(robot, limb.name, convention)
+            table = limb_table(robot, limb.name, convention)
             back, tip = screws_from_dh(table)
             assert table.joint_names == tuple(joint.name for joint in joints)
             assert (table.name, table.tip) == (limb.name, limb.tip)
@@ -222,7 +230,7 @@ def test_a_constant_transform_is_at_most_two_rows(convention):
 
 
 def test_one_formula_serves_floats_batches_and_symbols():
-    table = dh_from_limb(load_robot("poppy12"), "left_leg", "standard")
+    table = limb_table(load_robot("poppy12"), "left_leg", "standard")
     q = np.random.default_rng(12).uniform(-2, 2, (5, 6))
     symbols = sympy.symbols("q1:7", real=True)
     symbolic = sympy.lambdify(symbols, sympy.Matrix(as_array(dh_fk(table, symbols)).tolist()))

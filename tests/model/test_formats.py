@@ -11,9 +11,9 @@ import pytest
 import screwkin as sk
 from screwkin.errors import InputError, TableError, UnknownNameError
 from screwkin.model.dh_csv import dh_text
-from screwkin.model.dh_derive import dh_from_limb
 from screwkin.model.table import load_robot, robot_from_text
 from screwkin.model.urdf import urdf_from_robot
+from tests.model.chains import limb_table
 
 POPPY = load_robot("poppy12")
 
@@ -39,7 +39,7 @@ def load_robot_quietly(path: str) -> sk.Robot:
 
 def test_a_dh_file_is_read(tmp_path: Path) -> None:
     path = tmp_path / "leg.csv"
-    path.write_text(dh_text([dh_from_limb(POPPY, "right_leg")]))
+    path.write_text(dh_text([limb_table(POPPY, "right_leg")]))
     robot = load_robot(path)
     assert robot.name == "leg"
     assert robot.tip_names == ("right_foot",)

@@ -17,11 +17,10 @@ from screwkin.kinematics.positions import (
 )
 from screwkin.model.dh import DHTable, screws_from_dh
 from screwkin.model.dh_csv import load_dh
-from screwkin.model.dh_derive import dh_from_limb
 from screwkin.model.library import data_folder, robot_names
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
-from tests.model.chains import fk_by_matrices, lines
+from tests.model.chains import fk_by_matrices, limb_table, lines
 
 LEG = ("hip_roll", "hip_yaw", "hip_pitch", "knee", "ankle_pitch", "ankle_roll")
 SIDES = ("left", "right")
@@ -161,7 +160,7 @@ def test_the_screw_jacobian_is_the_derivative_of_the_papers_table(robot, leg):
 
 def test_the_derived_table_is_the_papers_up_to_where_its_origins_are_free(robot):
     """Along the parallel axes 3 to 5 the origins may slide: the paper slides by 23 mm at the knee."""
-    derived = dh_from_limb(robot, "left_leg")
+    derived = limb_table(robot, "left_leg")
     numbers = np.array([[row.alpha, row.a, row.d, row.offset] for row in derived.rows])
     right = math.pi / 2
     expected = [
