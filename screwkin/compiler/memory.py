@@ -22,8 +22,8 @@ BLOCKS = 4
 ALIGNED = 8
 """Numbers of a cache line, at which arrays begin."""
 
-_remembered: list[list[Array]] = []
-"""Each in a list of its own, which one thread alone can take out, as that is one operation of the interpreter."""
+_remembered: dict[int, list[Array]] = {}
+"""Each in a list of its own, by that list's id; the last one used stands last."""
 
 
 def results(batch: tuple[int, ...], shapes: Sequence[tuple[int, ...]]) -> tuple[Array, ...]:
@@ -38,31 +38,26 @@ def results(batch: tuple[int, ...], shapes: Sequence[tuple[int, ...]]) -> tuple[
     for shape, size, place in zip(whole, sizes, places, strict=True):
         found.append(cell[0][at : at + size].reshape(shape))
         at += place
-    _remembered.append(cell)
+    _remembered[id(cell)] = cell
     _forget()
     return tuple(found)
 
 
 def _unheld(size: int) -> list[Array] | None:
-    """A block of that size that nobody holds, taken out; None if there is none."""
-    for _ in range(len(_remembered)):
-        try:
-            cell = _remembered.pop(0)
-        except IndexError:  # another thread was faster
-            return None
+    """A block of that size that nobody holds, taken out; None if there is none. The last one used is warm."""
+    for key, cell in reversed(list(_remembered.items())):
         if cell[0].size == size and _references(cell) == _UNHELD:
-            return cell
-        _remembered.append(cell)
+            taken = _remembered.pop(key, None)  # by one thread alone
+            if taken is cell and _references(cell) == _UNHELD:
+                return cell
     return None
 
 
 def _forget() -> None:
     """Let go of the oldest blocks where they are too many."""
-    while len(_remembered) > BLOCKS or sum([cell[0].size for cell in list(_remembered)]) > TO:
-        try:
-            _remembered.pop(0)
-        except IndexError:
-            return
+    cells = list(_remembered.items())
+    while len(cells) > BLOCKS or sum(cell[0].size for _, cell in cells) > TO:
+        _remembered.pop(cells.pop(0)[0], None)
 
 
 def _references(cell: list[Array]) -> int:

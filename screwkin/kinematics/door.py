@@ -132,7 +132,8 @@ class Door:
         return [found[group.name] for group in self.program.outputs]
 
 
-def _layouts(groups: Sequence[Group]) -> list[tuple[tuple[int, ...], Struct]]:
+def _layouts(groups: Sequence[Group]) -> list[tuple[tuple[int, ...], Any]]:
+    """Shape and packed layout of every array."""
     return [(group.shape, Struct(f"{group.size}d")) for group in groups]
 
 

@@ -101,4 +101,4 @@ def test_little_is_remembered() -> None:
         results((count,), SHAPES)
     assert len(memory._remembered) <= memory.BLOCKS
     results((memory.TO,), SHAPES)
-    assert sum(cell[0].size for cell in memory._remembered) <= memory.TO
+    assert sum(cell[0].size for cell in memory._remembered.values()) <= memory.TO
