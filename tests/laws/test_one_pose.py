@@ -82,6 +82,32 @@ def test_reachable_poses_converge_from_home_inside_the_limits(name: str, spread:
             np.testing.assert_allclose(solution.state.q[:, joints], best, atol=1e-7)
 
 
+@pytest.mark.parametrize(
+    "seed", [pytest.param(k, marks=[] if k in (2, 4) else pytest.mark.slow) for k in range(20)]
+)
+def test_reachable_poses_of_random_robots_converge_from_home_inside_the_limits(seed: int) -> None:
+    """Limbs of 3 to 8 joints, poses and positions, alone or sharing a joint."""
+    robot = random_robot(seed)
+    solution = solved(robot, targets_at(robot, inside(robot, 1000 if seed not in (2, 4) else 100, seed)))
+    assert (solution.status == Status.CONVERGED).mean(axis=0).min() > 0.97
+
+
+def test_a_position_beyond_a_redundant_limb_s_reach_is_unreachable() -> None:
+    robot = random_robot(3)
+    chain = SerialChain.of(robot, "right_arm")
+    assert len(chain.joints) == 4
+    far = np.array([1.01 * sum(chain.levers), 0.0, 0.0]) + np.array(list(chain.screws[0].s0))
+    assert sk.limb_ik(robot, "right_arm", far).status == Status.UNREACHABLE
+    assert solved(robot, {"right_hand": far}).status == Status.UNREACHABLE
+
+
+def test_a_pose_that_five_joints_cannot_take_is_unreachable() -> None:
+    robot = random_robot(4)
+    T = sk.frame_pose(robot, sk.State(BASE, inside(robot, 20, 1)), "left_hand")
+    T[:, :3, :3] = T[::-1, :3, :3]
+    assert (sk.limb_ik(robot, "left_arm", T).status == Status.UNREACHABLE).all()
+
+
 def home_of(robot: sk.Robot, limb: str) -> np.ndarray:
     return np.asarray(sk.home(robot).q[list(SerialChain.of(robot, limb).joints)])
 
