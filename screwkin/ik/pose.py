@@ -42,9 +42,9 @@ def solve_pose(
             orientation free; world frame [m].
         guess: a nearby state; default ``home``. Its base pose holds where ``"base"`` is not given.
         method: ``"auto"``: closed forms of limbs where they have some, else Newton's method; ``"newton"``:
-            always that, from the guess and from further starts where it does not arrive within the limits.
+            always that. Where it does not arrive within the limits, further starts by bounded least squares.
         settings: tolerances and number of starts; within the tolerances a solution inside the limits is
-            preferred to a more exact one outside. Default: 1e-12, 20 starts.
+            preferred to a more exact one outside. Default: 1e-12, 64 starts.
 
     Returns:
         PoseSolution with ``.state .status .residual .iterations`` (..., limbs). Nothing is raised for samples
