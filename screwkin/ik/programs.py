@@ -1,7 +1,7 @@
 """Programs of limbs with closed forms: all branches in order, or the one nearest to a guess.
 
 One rule orders branches everywhere: those inside the limits first, then the nearest to the guess. A program
-certifies its answer only where rounding cannot change a decision; ``ik.certify`` decides the rest.
+certifies its answer only where rounding cannot change a decision; ``ik.branches`` decides the rest.
 """
 
 from __future__ import annotations
