@@ -12,7 +12,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.analysis.agreement import agreed, settled
 from screwkin.analysis.compliance import Conditions, StudyRow, Trial, repeated, summarised
 from screwkin.analysis.engines import Engine, Refinement, SimulatedCompliance, engines_for, opened
-from screwkin.analysis.verdict import Criteria, Measured, reasons_of
+from screwkin.analysis.verdict import Criteria, Measured, fallen_again, reasons_of
 from screwkin.errors import InputError
 from screwkin.files import text_sha256
 from screwkin.gait.balance import zmp as balance_of
@@ -135,9 +135,8 @@ def validate(
 def _repeated(check: Validation, trials: Sequence[Trial]) -> Validation:
     """The verdict with repeated runs, none of which may fall."""
     (row,) = summarised(trials)
-    check = replace(check, repeated=row.to_dict(), study=row)
-    reasons = tuple(dict.fromkeys((*check.reasons, *reasons_of(check, check.criteria))))
-    return replace(check, reasons=reasons, passed=not reasons)
+    reasons = (*check.reasons, *fallen_again(row.to_dict()))
+    return replace(check, repeated=row.to_dict(), study=row, reasons=reasons, passed=not reasons)
 
 
 def film(robot: Robot, trajectory: Trajectory, run: Run, camera: Camera) -> tuple[Picture, ...]:

@@ -123,6 +123,13 @@ def limb_colours(account: Account) -> dict[str, str]:
     return colours
 
 
+def joint_colours(account: Account, others: str = PLAIN) -> dict[str, str]:
+    """Colour of every joint: its limb's."""
+    robot, of_limb = account.robot, limb_colours(account)
+    own = {robot.joint_names[i]: of_limb[limb.name] for limb in robot.limbs for i in robot.path_to(limb.link)}
+    return {**dict.fromkeys(robot.joint_names, others), **own}
+
+
 def shade_swings(axes: Axes, account: Account) -> None:
     """Tint the times at which a foot is in the air with that foot's colour; mark where steps begin."""
     time, contact = account.trajectory.time, account.trajectory.contact
