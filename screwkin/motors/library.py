@@ -74,7 +74,9 @@ def motors_of(robot: Robot) -> tuple[Motor, ...]:
     Raises:
         InputError: the table names no model for a joint. UnknownNameError, TableError: see ``load_motor``.
     """
-    return tuple(_with_supply(load_motor(name, _folder(robot)).motor, robot.servos) for name in _names(robot))
+    return tuple(
+        _with_supply(load_motor(name, table_folder(robot)).motor, robot.servos) for name in _names(robot)
+    )
 
 
 def names_motors(robot: Robot) -> bool:
@@ -85,13 +87,26 @@ def names_motors(robot: Robot) -> bool:
         return False
 
 
+def has_motor(model: str, folder: Path | None = None) -> bool:
+    """Whether a name or a path stands for figures of a motor."""
+    try:
+        return bool(load_motor(model, folder))
+    except InputError:
+        return False
+
+
+def table_folder(robot: Robot) -> Path | None:
+    """The folder of a robot's table, where paths in it begin."""
+    return Path(robot.path).parent if robot.path else None
+
+
 def motors_named(robot: Robot, name: str) -> tuple[Motor, ...]:
     """The same model in every joint of a robot.
 
     Raises:
         UnknownNameError, TableError: see ``load_motor``.
     """
-    return (_with_supply(load_motor(name, _folder(robot)).motor, robot.servos),) * len(robot.joints)
+    return (_with_supply(load_motor(name, table_folder(robot)).motor, robot.servos),) * len(robot.joints)
 
 
 def motor_text(model: MotorModel) -> str:
@@ -137,10 +152,6 @@ def _names(robot: Robot) -> tuple[str, ...]:
             "[servos] of its table"
         )
     return tuple(map(str, chosen.values()))
-
-
-def _folder(robot: Robot) -> Path | None:
-    return Path(robot.path).parent if robot.path else None
 
 
 def _with_supply(motor: Motor, servos: Mapping[str, Any]) -> Motor:
