@@ -18,6 +18,9 @@ STEP = 2e-3
 """Duration of a step while fitting [s]; errors are reported at the bench's own."""
 TYPICAL_ERROR = 0.03
 """Beyond such an error [rad] a sample counts linearly: a servo stuck elsewhere says little by how far."""
+PRIOR = 0.1
+"""What a figure costs that doubles: this share of all samples being wrong by the typical error. What the logs
+do not show stays as it was."""
 SCALES = ((1.0, 1.0), (0.6, 2.0))
 """Starts: factors of the torque constant and the friction."""
 _SAMPLE_EVERY = 5
@@ -99,14 +102,15 @@ def identify(
     names, report = tuple(spec), progress or (lambda share: None)
     first, low, high = np.array(list(spec.values())).T
     scale = np.maximum(np.abs(first), 0.02 * (high - low))
+    pull = TYPICAL_ERROR * np.sqrt(PRIOR * bench.samples) / scale
     best: Any = None
     for i, (of_constant, of_friction) in enumerate(SCALES):
         scaled = {"constant": of_constant, **dict.fromkeys(FRICTIONS[friction], of_friction)}
         guess = first * [scaled.get(name, 1.0) for name in names]
         found = least_squares(
-            lambda x: bench.residuals(names, x[None])[:, 0].ravel(),
+            lambda x: np.append(bench.residuals(names, x[None])[:, 0].ravel(), (x - first) * pull),
             np.clip(guess, low + 1e-9 * (high - low), high - 1e-9 * (high - low)),
-            lambda x: bench.jacobian(names, x, scale, high),
+            lambda x: np.vstack([bench.jacobian(names, x, scale, high), np.diag(pull)]),
             bounds=(low, high),
             x_scale=scale,
             loss="soft_l1",
@@ -188,6 +192,11 @@ class _Bench:
         lasts = np.stack([grid <= log.time[-1] for log in logs], axis=1)
         kp, voltage = np.array([[own.kp, own.voltage] for own in logged]).T
         return cls(replace(motor, kp=kp, voltage=voltage), hanging, goals, positions, lasts)
+
+    @property
+    def samples(self) -> int:
+        """Number of residuals."""
+        return len(self.goals[::_SAMPLE_EVERY]) * self.goals.shape[1]
 
     def residuals(self, names: Sequence[str], x: Array) -> Array:
         """Position errors (S, P, L) [rad] at every few steps, for P sets of unknowns (P, n)."""
