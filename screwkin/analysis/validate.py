@@ -16,7 +16,7 @@ from screwkin.analysis.verdict import Criteria, Measured, fallen_again, reasons_
 from screwkin.errors import InputError
 from screwkin.files import text_sha256
 from screwkin.gait.balance import zmp as balance_of
-from screwkin.gait.compensation import way_of
+from screwkin.gait.compensation import stiffness_of, way_of
 from screwkin.gait.intended import intended
 from screwkin.model.robot import Robot, robot_text
 from screwkin.sim.camera import Camera, Picture
@@ -93,6 +93,7 @@ def validate(
     _check_fit(robot, trajectory)
     rule, report = criteria or Criteria(), progress or (lambda share: None)
     compliance = (compliance or SimulatedCompliance()).for_trajectory(robot, trajectory)
+    commands = motion or compliance.commands(robot, trajectory)
     names = engines_for(engine, robot, compliance)
     ways = _FINER if check_solver and names != ("kinematic",) else {"usual": Refinement()}
     first = (0.2 if compliance.repeat else 1.0) / (len(names) * len(ways))
@@ -104,7 +105,7 @@ def validate(
         try:
             run = simulate(
                 robot,
-                motion or trajectory,
+                commands,
                 backend,
                 rule.schedule,
                 lambda share: report(first * (done + share)),
@@ -112,7 +113,8 @@ def validate(
         finally:
             backend.close()
         done += 1
-        return judged(robot, trajectory, run, rule, compliance)
+        check = judged(robot, trajectory, run, rule, compliance)
+        return replace(check, compensation=way_of(commands), joint_stiffness=_stiffness(commands, check))
 
     checks = []
     for name in names:
@@ -130,6 +132,12 @@ def validate(
         report(first + (1.0 - first) * share)
 
     return _repeated(check, repeated(robot, trajectory, compliance.servos.stiffness, conditions, later))
+
+
+def _stiffness(commands: Trajectory, check: Validation) -> dict[str, float] | None:
+    """Of the simulated springs, or what the commands of motors allow for [N m/rad]."""
+    allowed = stiffness_of(commands) if check.servo not in ("rigid", "springs") else None
+    return {**allowed} if isinstance(allowed, Mapping) else check.joint_stiffness
 
 
 def _repeated(check: Validation, trials: Sequence[Trial]) -> Validation:
