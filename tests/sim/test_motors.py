@@ -6,7 +6,7 @@ import pytest
 import screwkin as sk
 from screwkin.errors import InputError
 from screwkin.model.state import State
-from screwkin.motors.library import load_motor
+from screwkin.motors.library import load_motor, motors_of
 from screwkin.motors.pendulum import delayed, swing
 from screwkin.motors.records import Friction, Motor
 from screwkin.servo.bench import pendulum_of
@@ -82,3 +82,29 @@ def test_a_pendulum_swings_in_an_engine_as_in_the_library(engine, servo):
 def test_a_step_too_long_for_a_servo_is_refused():
     with pytest.raises(InputError, match="too long for the servo of joint 0"):
         MotorServos([SERVOS["assumed"]], 0.05, "assumed")
+
+
+def test_in_the_air_rotors_turn_a_robot_no_more_in_one_engine_than_in_the_other():
+    """Legs swing by 0.3 rad within 0.2 s; bodies with the rotors' inertia would turn the torso elsewhere."""
+    pytest.importorskip("pybullet")
+    pytest.importorskip("mujoco")
+    robot = sk.load_robot("bioloid")
+    home = sk.home(robot)
+    base = np.array(home.T_world_base)
+    base[2, 3] += 1.0
+    legs = np.array([name.endswith(("hip_pitch", "shoulder_roll")) for name in robot.joint_names])
+    found = []
+    for backend in ENGINES.values():
+        engine = backend(robot, servos=MotorServos(motors_of(robot), 1e-3, "table"))
+        engine.reset(State(base, np.array(home.q)))
+        for k in range(200):
+            q = np.array(home.q) + 0.3 * legs * np.sin(np.pi * k / 400)
+            engine.step(Command(q, np.zeros(18), base))
+        found.append(engine.observe())
+        engine.close()
+    one, other = found
+    turned = float(np.arccos((np.trace(base[:3, :3].T @ one.T_world_base[:3, :3]) - 1) / 2))
+    between = float(np.arccos((np.trace(other.T_world_base[:3, :3].T @ one.T_world_base[:3, :3]) - 1) / 2))
+    assert turned > 0.1
+    assert between < 0.02 * turned
+    np.testing.assert_allclose(one.q, other.q, atol=5e-3)
