@@ -37,6 +37,12 @@ _FINER = {
 }
 
 
+_NOT_THE_FILE = (
+    "the servos were sent the plan with the torque term, which the file does not hold, so send refuses it; "
+    "to send, write the commands with walk --compensate dynamic and validate those"
+)
+
+
 @dataclass(frozen=True, eq=False)
 class Validation(Measured):
     """The verdict with the run it rests on; series and pictures are for reports."""
@@ -114,7 +120,14 @@ def validate(
             backend.close()
         done += 1
         check = judged(robot, trajectory, run, rule, compliance)
-        return replace(check, compensation=way_of(commands), joint_stiffness=_stiffness(commands, check))
+        if commands is trajectory or motion is not None:
+            return check
+        return replace(
+            check,
+            compensation=way_of(commands),
+            joint_stiffness=_stiffness(commands),
+            warnings=(*check.warnings, _NOT_THE_FILE),
+        )
 
     checks = []
     for name in names:
@@ -134,10 +147,10 @@ def validate(
     return _repeated(check, repeated(robot, trajectory, compliance.servos.stiffness, conditions, later))
 
 
-def _stiffness(commands: Trajectory, check: Validation) -> dict[str, float] | None:
-    """Of the simulated springs, or what the commands of motors allow for [N m/rad]."""
-    allowed = stiffness_of(commands) if check.servo not in ("rigid", "springs") else None
-    return {**allowed} if isinstance(allowed, Mapping) else check.joint_stiffness
+def _stiffness(commands: Trajectory) -> dict[str, float] | None:
+    """What the commands of motors allow for [N m/rad]."""
+    allowed = stiffness_of(commands)
+    return {**allowed} if isinstance(allowed, Mapping) else None
 
 
 def _repeated(check: Validation, trials: Sequence[Trial]) -> Validation:

@@ -4,11 +4,13 @@ import pytest
 
 import screwkin as sk
 from screwkin.analysis.engines import SimulatedCompliance
+from screwkin.analysis.readiness import ready
 from screwkin.analysis.validate import validate
 from screwkin.compliance.springs import joint_stiffness
-from screwkin.errors import InputError, UnknownNameError
+from screwkin.errors import InputError, SafetyError, UnknownNameError
 from screwkin.gait.compensation import compensate, stiffness_of, way_of
 from screwkin.sim.compliant import Compliance
+from tests.verdicts import passing
 
 ROBOT = sk.load_robot("bioloid")
 TABLE = SimulatedCompliance(motors="table")
@@ -24,6 +26,14 @@ def fast():
 def verdict(fast):
     pytest.importorskip("mujoco")
     return validate(ROBOT, fast, "mujoco", compliance=TABLE)
+
+
+def test_the_torque_term_on_a_plan_is_a_warning_and_send_refuses_such_a_verdict(verdict, fast, tmp_path):
+    """What send would play is the plan; only the file with the commands is what was validated."""
+    assert any("--compensate dynamic" in warning for warning in verdict.warnings)
+    path = passing(fast.save(tmp_path / "trajectory.npz"), servo="table", compensation=verdict.compensation)
+    with pytest.raises(SafetyError, match="compensation is none, the verdict says dynamic"):
+        ready(path)
 
 
 def test_motors_with_the_torque_term_hardly_tilt(verdict):
