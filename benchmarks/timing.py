@@ -68,8 +68,12 @@ def interleaved(runs: Mapping[str, Run], rounds: int, budget: float = 60.0) -> d
 def _measured(run: Run, times: int) -> Elapsed:
     """Time per call of several calls in a row."""
     cpu_before, before = time.process_time(), time.perf_counter()
-    # Results are let go at once, so that their memory serves again.
-    told = [value for _ in range(times) if isinstance(value := run(), Elapsed)]
+    told = []
+    for _ in range(times):
+        value = run()
+        if isinstance(value, Elapsed):
+            told.append(value)
+        del value  # at once, so that its memory serves again
     wall, cpu = time.perf_counter() - before, time.process_time() - cpu_before
     if told:
         wall, cpu = sum(value.wall for value in told), sum(value.cpu for value in told)

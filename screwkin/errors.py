@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, TypeVar, overload
 
@@ -85,9 +86,39 @@ class OutputError(InputError, OSError):
 
 
 class MissingDependencyError(ScrewkinError, ImportError):
-    """An optional package is absent; the message says what to install."""
+    """A library is absent; the message says what to install."""
 
     exit_code = 2
+
+
+_PACKAGES = {"serial": "pyserial", "dynamixel_sdk": "dynamixel-sdk", "PIL": "pillow"}
+
+
+def missing_library(error: ImportError, purpose: str) -> MissingDependencyError:
+    """The error for an import that failed: which library, what needs it, and the command that installs it."""
+    name = (error.name or "a library").partition(".")[0]
+    package = _PACKAGES.get(name, name)
+    if isinstance(error, ModuleNotFoundError):
+        state, command = "is not installed", f"python -m pip install {package}"
+    else:
+        state, command = f"cannot be imported ({error})", f"python -m pip install --force-reinstall {package}"
+    return MissingDependencyError(f"{purpose} needs {package}, which {state}; install it with: {command}")
+
+
+@contextmanager
+def needed_for(purpose: str) -> Iterator[None]:
+    """Imports inside may fail: libraries that not every installation has.
+
+    Args:
+        purpose: what needs them, in one noun that begins a sentence.
+
+    Raises:
+        MissingDependencyError: one is absent; says which, and how to install it.
+    """
+    try:
+        yield
+    except ImportError as error:
+        raise missing_library(error, purpose) from None
 
 
 class NoSolutionError(ScrewkinError, ArithmeticError):

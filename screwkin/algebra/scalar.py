@@ -36,6 +36,8 @@ def is_symbolic(x: Scalar) -> bool:
 
 def is_jax(x: object) -> bool:
     """True for JAX arrays and tracers; jax is not imported to find out."""
+    if type(x) is np.ndarray:  # asked most, and jax takes long to say no
+        return False
     jax = sys.modules.get("jax")
     return jax is not None and isinstance(x, jax.Array)
 

@@ -176,9 +176,9 @@ def closure_of(robot: Robot, trajectory: Trajectory, motion: Trajectory) -> dict
     errors = {}
     for tip, recorded in trajectory.T_world_tip.items():
         reached = as_array(T @ pose_in_base(robot, D, tip), (trajectory.samples,))
-        gap = float(np.linalg.norm(reached[:, :3, 3] - recorded[:, :3, 3], axis=1).max())
+        gap = np.linalg.norm(reached[:, :3, 3] - recorded[:, :3, 3], axis=1)
         turn = norm(rotation_log(rotation_from_array(reached[:, :3, :3] @ recorded[:, :3, :3].mT)))
-        errors[tip] = (gap, float(turn.max()))
+        errors[tip] = (float(gap.max()), float(turn.max()))
     return errors
 
 

@@ -10,13 +10,25 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any, TypeVar
 
+from screwkin.sim.self_collision import deepest
+
 V = TypeVar("V", bound=Any)
 """A ``Validation``, or any record with its measured fields."""
 
 SCATTER = ("end_error_mm", "slip_mm", "max_tilt_deg", "zmp_rms_mm", "zmp_max_mm")
 """Fields whose range over a solver's settings is reported."""
 _LEAST = ("fell_at", "min_margin_mm", "min_base_height")
-_OWN = ("passed", "reasons", "warnings", "engine", "engine_settings", "engines", "solver", "undecided")
+_OWN = (
+    "passed",
+    "reasons",
+    "warnings",
+    "engine",
+    "engine_settings",
+    "engines",
+    "solver",
+    "undecided",
+    "self_collisions",
+)
 _JUDGED = ("end_error_mm", "slip_mm")
 
 
@@ -48,6 +60,7 @@ def agreed(checks: Sequence[V]) -> V:
         engines=_joined(values["engines"]),
         solver=_joined(solvers) if solvers else None,
         undecided=any(values["undecided"]),
+        self_collisions=deepest(one for own in values["self_collisions"] for one in own or ()),
     )
 
 

@@ -19,8 +19,8 @@ from screwkin.trajectory import Trajectory
 
 Engine = Literal["auto", "pybullet", "mujoco", "kinematic"]
 ENGINES: tuple[Engine, ...] = ("auto", "pybullet", "mujoco", "kinematic")
-PROVING = ("pybullet", "mujoco")
-"""Engines whose contact forces confirm a walk; ``+`` joins the names of two."""
+PROVING = ("mujoco", "pybullet")
+"""Engines whose contact forces confirm a walk; ``+`` joins the names of those that agreed."""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.analysis.agreement import agreed, settled
 from screwkin.analysis.compliance import Conditions, StudyRow, Trial, repeated, summarised
 from screwkin.analysis.engines import Engine, Refinement, SimulatedCompliance, engines_for, opened
-from screwkin.analysis.verdict import Criteria, Measured, reasons_of
+from screwkin.analysis.verdict import Criteria, Measured, fallen_again, reasons_of
 from screwkin.errors import InputError
 from screwkin.files import text_sha256
 from screwkin.gait.balance import zmp as balance_of
@@ -23,6 +23,7 @@ from screwkin.sim.camera import Camera, Picture
 from screwkin.sim.measure import Slip, ZmpRecord, slip, speed_use, torque_use, zmp_record
 from screwkin.sim.render import pictures
 from screwkin.sim.run import Run, simulate
+from screwkin.sim.self_collision import collisions_of_run
 from screwkin.trajectory import Trajectory, check_joints
 
 _MEASURED = (
@@ -134,9 +135,8 @@ def validate(
 def _repeated(check: Validation, trials: Sequence[Trial]) -> Validation:
     """The verdict with repeated runs, none of which may fall."""
     (row,) = summarised(trials)
-    check = replace(check, repeated=row.to_dict(), study=row)
-    reasons = tuple(dict.fromkeys((*check.reasons, *reasons_of(check, check.criteria))))
-    return replace(check, reasons=reasons, passed=not reasons)
+    reasons = (*check.reasons, *fallen_again(row.to_dict()))
+    return replace(check, repeated=row.to_dict(), study=row, reasons=reasons, passed=not reasons)
 
 
 def film(robot: Robot, trajectory: Trajectory, run: Run, camera: Camera) -> tuple[Picture, ...]:
@@ -176,8 +176,6 @@ def judged(
         reasons=(),
         warnings=_warnings(robot, trajectory, run, slipped, speed),
         engine=run.engine,
-        engine_settings={run.engine: dict(run.settings)},
-        servo=run.servo,
         criteria=criteria,
         fell=run.fallen_at is not None,
         fell_at=run.fallen_at,
@@ -202,6 +200,7 @@ def judged(
         engines={},
         solver=None,
         undecided=False,
+        self_collisions=None if run.engine == "kinematic" else collisions_of_run(robot, trajectory, run),
         run=run,
         zmp=zmp,
     )

@@ -17,6 +17,7 @@ from screwkin.model.robot import Robot
 from screwkin.servo.servo_map import ServoMap
 from screwkin.sim.measure import WINDOW
 from screwkin.sim.run import Schedule
+from screwkin.sim.self_collision import SelfCollision
 from screwkin.trajectory import Trajectory
 
 _FLOORS = ("settle", "hold", "fallen_height")
@@ -36,7 +37,7 @@ class Criteria:
     end_error_share: float = 0.05
     slip: float = 0.010
     torque_share: float = 0.999
-    frame_deviation: float = 0.010
+    frame_deviation: float = 0.005
     schedule: Schedule = field(default_factory=Schedule)
 
 
@@ -46,19 +47,23 @@ class Measured:
 
     zmp_rms_mm and zmp_max_mm: contact ZMP against the planned one, the larger of x and y; the ``_xy`` fields
     hold both, and ankle_rms_xy_mm the ankle sensors against the contacts.
+    engine: names of all engines, joined by ``+``; numbers are the worst of them. By the engine's name:
+    engine_settings, engines: what each measured, and solver: what finer settings change, None if not tried.
+    undecided: the verdict lies within a solver's own scatter; it has not passed.
     robot_sha256: of the table that was simulated. compensation: how the commands allow for elastic servos, or
     ``none``; servo: what moved the joints; joint_stiffness [N m/rad] and sole_stiffness [N/m]: of the
-    simulated springs, None if rigid; repeated: runs under other conditions.
-    engine: names of all engines, joined by ``+``; numbers are the worst of them. By the engine's name:
-    engine_settings; engines: what each measured; solver: what finer settings change, None if not tried.
-    undecided: the verdict lies within a solver's own scatter; it has not passed.
+    simulated springs, None if rigid; repeated: runs under other conditions. self_collisions: along plan and
+    simulation, beyond what ``home`` has; None where none were looked for.
     """
 
     passed: bool
     reasons: tuple[str, ...]
     warnings: tuple[str, ...]
     engine: str
-    engine_settings: dict[str, Any]
+    engine_settings: dict[str, dict[str, Any]]
+    engines: dict[str, dict[str, Any]]
+    solver: dict[str, dict[str, Any]] | None
+    undecided: bool
     servo: str
     criteria: Criteria
     fell: bool
@@ -86,15 +91,17 @@ class Measured:
     joint_stiffness: dict[str, float] | None
     sole_stiffness: float | None
     repeated: dict[str, Any] | None
-    engines: dict[str, dict[str, Any]]
-    solver: dict[str, dict[str, Any]] | None
-    undecided: bool
+    self_collisions: tuple[SelfCollision, ...] | None
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON data, without what subclasses add."""
         values = {f.name: getattr(self, f.name) for f in fields(Measured)}
         plain = {k: list(v) if isinstance(v, tuple) else v for k, v in values.items()}
-        return plain | {"criteria": asdict(self.criteria)}
+        collisions = self.self_collisions
+        return plain | {
+            "criteria": asdict(self.criteria),
+            "self_collisions": None if collisions is None else [one.to_dict() for one in collisions],
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,14 +171,14 @@ def contradictions(verdict: Verdict) -> tuple[str, ...]:
     below = [f"{name} is {value:g}, below 0" for name, value in lengths.items() if value < 0]
     tilted = verdict.max_tilt_deg > np.rad2deg(Criteria().schedule.fallen_tilt)
     fallen = [f"tilted by {verdict.max_tilt_deg:.0f} deg, and not fallen"] if tilted else []
-    silent = [
-        f"engine {name} has not passed by itself"
-        for name in verdict.engine.split("+")
-        if verdict.engines.get(name, {}).get("passed") is not True
-    ]
-    open_still = ["undecided within the solver's own scatter"] if verdict.undecided else []
-    own_reasons = (*verdict.reasons, *reasons_of(verdict, Criteria()))
-    return tuple(dict.fromkeys((*own_reasons, *weaker, *below, *fallen, *silent, *open_still)))
+    others = ["undecided"] if verdict.undecided else []
+    for name in verdict.engine.split("+"):
+        alone = verdict.engines.get(name, {})
+        if alone.get("passed") is not True or alone.get("fell") is not False:
+            others.append(f"engines holds no pass of {name}")
+    return tuple(
+        dict.fromkeys((*verdict.reasons, *weaker, *reasons_of(verdict, Criteria()), *below, *fallen, *others))
+    )
 
 
 def servo_map_sha256(robot: Robot) -> str:
@@ -185,6 +192,14 @@ def servo_map_sha256(robot: Robot) -> str:
 def _flat(criteria: Mapping[str, Any]) -> dict[str, float]:
     inner = dict(criteria)
     return inner | inner.pop("schedule")
+
+
+def fallen_again(repeated: Mapping[str, Any] | None) -> tuple[str, ...]:
+    """The reason against a walk that fell in repeated runs, none of which may."""
+    if repeated is None or repeated.get("fallen") == 0:
+        return ()
+    fallen, runs = repeated.get("fallen"), repeated.get("runs")
+    return (f"falls in {fallen} of {runs} repetitions under other frictions and time steps",)
 
 
 def reasons_of(facts: Measured, rule: Criteria) -> tuple[str, ...]:
@@ -211,15 +226,14 @@ def reasons_of(facts: Measured, rule: Criteria) -> tuple[str, ...]:
         reasons.append(f"a stance foot slips {facts.slip_mm:.1f} mm, allowed {1e3 * rule.slip:.1f} mm")
     if not facts.min_margin_mm >= 0.0:
         reasons.append(f"planned ZMP leaves the support polygon by {-facts.min_margin_mm:.1f} mm")
-    again = facts.repeated
-    if again is not None and again.get("fallen") != 0:
-        reasons.append(
-            f"falls in {again.get('fallen')} of {again.get('runs')} repetitions under other frictions and "
-            "time steps"
-        )
+    reasons += fallen_again(facts.repeated)
     tired = [f"{name} {100 * use:.0f} %" for name, use in facts.torque_use.items() if use > rule.torque_share]
     if tired:
         reasons.append(f"torque at the servo's limit for {1e3 * WINDOW:.0f} ms: {', '.join(tired)}")
+    if facts.self_collisions is None:
+        reasons.append("self-collisions were not looked for")
+    elif facts.self_collisions:
+        reasons.append(f"links collide: {', '.join(map(str, facts.self_collisions))}")
     return tuple(reasons)
 
 

@@ -13,7 +13,7 @@ from importlib import import_module
 from io import TextIOWrapper
 from typing import Any, NoReturn
 
-from screwkin.errors import InputError, ScrewkinError, one_of
+from screwkin.errors import InputError, ScrewkinError, missing_library, one_of
 
 VERBS = {
     "demo": "A robot walks: table, mechanism, gait, ZMP, simulation, and a report with pictures.",
@@ -127,6 +127,8 @@ def _dispatch(words: Sequence[str]) -> int:
 
 def _report(error: Exception, words: Sequence[str], debug: bool) -> int:
     """Print an error as one message, with ``--json`` also as an object on stdout; returns its exit code."""
+    if isinstance(error, ModuleNotFoundError) and not str(error.name).startswith("screwkin"):
+        error = missing_library(error, f"screwkin {words[0]}")
     if isinstance(error, ScrewkinError):
         code, message = error.exit_code, str(error)
     elif hasattr(error, "format_message"):  # typer's own: an unknown option, a missing argument

@@ -11,7 +11,7 @@ import typer
 from screwkin.analysis.compare import Comparison, compare_models
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, RobotName
-from screwkin.cli.output import aligned, print_json, remark
+from screwkin.cli.output import aligned, drawn, print_json, remark
 from screwkin.files import atomic_write
 from screwkin.model.dh_csv import dh_text
 from screwkin.model.table import load_robot
@@ -58,10 +58,11 @@ def _write(comparison: Comparison, folder: Path, plots: bool) -> list[Path]:
     files = [folder / "dh.csv"]
     with atomic_write(files[0]) as file:
         file.write(dh_text([chain.table for chain in comparison.chains]))
-    if plots and comparison.misalignment is not None:
+    series = comparison.misalignment
+    if plots and series is not None:
         from screwkin.report.misalignment import save_misalignment
 
-        files.append(save_misalignment(comparison.misalignment, folder / "misalignment.png"))
+        files += drawn(lambda: [save_misalignment(series, folder / "misalignment.png")])
     return files
 
 

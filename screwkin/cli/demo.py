@@ -75,14 +75,14 @@ def demo(
         npz = folder / "trajectory.npz"
         play: dict[str, Any] = {}
 
-        def servos(check: Validation) -> Sequence[Saved]:
+        def servos(check: Validation) -> Callable[[], Sequence[Saved]]:
             show(aligned(validation_numbers(check), "   ") + "\n")
             show(
                 "6. The servos, virtual and in simulated time: every frame goes through the gate and the bus"
             )
             play.update(_played_to_virtual(npz, name, folder / "play.npz"))
             show(aligned([(line,) for line in play["lines"]], "   ") + "\n")
-            return save_servo_pictures(account, folder, play["log"]) if "log" in play else ()
+            return lambda: save_servo_pictures(account, folder, play["log"]) if "log" in play else ()
 
         commands = [
             command,
@@ -94,7 +94,7 @@ def demo(
             check = simulate_to_files(account, folder, folder / "validation.json", wish)
         except MissingDependencyError:
             page = write_report(account, folder)
-            remark(f"The report stops before the simulation: {page}")
+            remark(f"The report holds what was done so far: {page}")
             raise
         _show_end(show, folder, check.passed, check.reasons)
     if as_json:

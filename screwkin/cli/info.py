@@ -10,7 +10,10 @@ from screwkin.analysis.facts import Facts, facts_of
 from screwkin.cli.options import AsJson, RobotName, point_of
 from screwkin.cli.output import aligned, print_json
 from screwkin.compiler.run import large_batches
+from screwkin.errors import MissingDependencyError
+from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
+from screwkin.sim.self_collision import touching_at_home
 
 
 def info(
@@ -30,10 +33,19 @@ def info(
         load_robot(robot), posture, point_of(at, "--at") or (0.0, 0.0, 0.0), point_of(point, "--point")
     )
     if as_json:
-        print_json(facts.to_dict() | {"large_batches": large_batches()})
+        touching = _touching(facts.robot)
+        print_json(facts.to_dict() | {"large_batches": large_batches(), "touching_at_home": touching})
     else:
         print(_text(facts))
     return 0
+
+
+def _touching(robot: Robot) -> list[tuple[str, str]] | None:
+    """Links that touch at home, which no verdict counts as a collision; None where mujoco is missing."""
+    try:
+        return list(touching_at_home(robot))
+    except MissingDependencyError:
+        return None
 
 
 def _text(facts: Facts) -> str:
@@ -48,6 +60,11 @@ def _text(facts: Facts) -> str:
             for limb in robot.limbs
         ),
     ]
+    touching = _touching(robot)
+    if touching is None:
+        body.append(("links that touch at home", "unknown: needs mujoco (python -m pip install mujoco)"))
+    elif touching:
+        body.append(("links that touch at home", ", ".join(f"{a} and {b}" for a, b in touching)))
     closed = [
         ("couplings", f"{data['couplings']}: {len(robot.joints)} real, {len(virtual)} virtual"),
         ("links", data["links"]),

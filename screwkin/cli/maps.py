@@ -14,7 +14,7 @@ import typer
 from screwkin.analysis.workspace import WorkspaceMap
 from screwkin.analysis.workspace import workspace as maps_of
 from screwkin.cli.folder import output_folder
-from screwkin.cli.output import aligned, print_json, progress_bar
+from screwkin.cli.output import aligned, drawn, print_json, progress_bar
 from screwkin.errors import InputError, UnreachableError
 from screwkin.files import atomic_write_bytes, npz_bytes
 from screwkin.model.robot import Robot
@@ -51,7 +51,7 @@ def run_maps(
         with atomic_write_bytes(folder / f"{verb}.npz") as file:
             file.write(npz_bytes(result.arrays))
         if plots:
-            _draw(result, folder)
+            drawn(lambda: _draw(result, folder))
     if as_json:
         print_json({**result.data, "folder": str(folder)})
     else:
@@ -61,13 +61,15 @@ def run_maps(
     return 0
 
 
-def _draw(result: MapResult, folder: Path) -> None:
+def _draw(result: MapResult, folder: Path) -> list[Path]:
     from screwkin.report.style import save_figure, styled
 
+    saved = []
     with progress_bar("pictures") as done, styled():
         for count, (name, picture) in enumerate(result.pictures.items()):
-            save_figure(picture(), folder / name)
+            saved.append(save_figure(picture(), folder / name))
             done((count + 1) / len(result.pictures))
+    return saved
 
 
 def reached_maps(

@@ -7,7 +7,11 @@ import math
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, TypeVar
+
+from screwkin.errors import MissingDependencyError
+
+T = TypeVar("T")
 
 
 def print_json(data: Mapping[str, Any]) -> None:
@@ -33,6 +37,15 @@ def plain(value: Any) -> Any:
 def remark(text: str) -> None:
     """A line for the reader that is no result."""
     print(text, file=sys.stderr, flush=True)
+
+
+def drawn(draw: Callable[[], Sequence[T]]) -> Sequence[T]:
+    """Pictures, which stand beside results: without the library that draws them a remark, and none."""
+    try:
+        return draw()
+    except MissingDependencyError as error:
+        remark(f"no pictures: {error}")
+        return ()
 
 
 def silent(text: str) -> None:

@@ -49,7 +49,7 @@ def replay(trajectory: Path, log: Path, wish: Wish, output: Path | None, as_json
             commands=[line for line in commands if line],
             motion=motion,
             criteria=Criteria(torque_share=np.inf),
-            more=lambda check: save_servo_pictures(account, folder, played) if wish.plots else (),
+            more=lambda check: lambda: save_servo_pictures(account, folder, played),
         )
         check = simulate_to_files(account, folder, folder / VERDICT, wish)
     if planned.samples < loaded.samples:

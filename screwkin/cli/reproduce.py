@@ -13,7 +13,8 @@ import typer
 
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder
-from screwkin.cli.output import aligned, plain, print_json, progress_bar
+from screwkin.cli.output import aligned, plain, print_json, progress_bar, remark
+from screwkin.errors import MissingDependencyError
 from screwkin.files import atomic_write
 from screwkin.papers.bench import Bench
 from screwkin.papers.claims import load_paper
@@ -63,8 +64,11 @@ def reproduce(
 def _draw(result: Reproduction, bench: Bench, folder: Path, command: str) -> None:
     from screwkin.papers.page import draw_pictures, write_pages
 
+    def left_out(path: Path, error: MissingDependencyError) -> None:
+        remark(f"no {path.name}: {error}")
+
     with progress_bar("pictures") as done:
-        pictures = draw_pictures(result.paper, bench, folder, done)
+        pictures = draw_pictures(result.paper, bench, folder, done, left_out)
     write_pages(result, pictures, folder, command, _versions())
 
 

@@ -14,7 +14,7 @@ from screwkin.analysis.engines import ENGINES, Engine, SimulatedCompliance
 from screwkin.analysis.validate import Validation
 from screwkin.analysis.validate import validate as validated
 from screwkin.analysis.verdict import Criteria, verdict_of
-from screwkin.cli.output import plain, progress_bar, remark
+from screwkin.cli.output import drawn, plain, progress_bar, remark
 from screwkin.errors import UnknownNameError
 from screwkin.files import atomic_write
 from screwkin.report.page import write_page
@@ -31,7 +31,8 @@ class Wish:
     """What a simulation is to be: engine, a window, a film, pictures and page; commands for the page.
 
     check_solver, compliance: see ``validate``. motion: what the joints do instead of the trajectory;
-    criteria: what a walk must satisfy; more: draws further pictures once the verdict is written.
+    criteria: what a walk must satisfy; more: what follows once the verdict is written; it returns what draws
+    more pictures.
     """
 
     engine: str = "auto"
@@ -43,7 +44,7 @@ class Wish:
     compliance: SimulatedCompliance = field(default_factory=SimulatedCompliance)
     motion: Trajectory | None = None
     criteria: Criteria | None = None
-    more: Callable[[Validation], Sequence[Saved]] = lambda check: ()
+    more: Callable[[Validation], Callable[[], Sequence[Saved]]] = lambda check: tuple
 
 
 def simulate_to_files(account: Account, folder: Path, verdict: Path, wish: Wish) -> Validation:
@@ -83,8 +84,8 @@ def simulate_to_files(account: Account, folder: Path, verdict: Path, wish: Wish)
     more = wish.more(check)
     if wish.plots:
         with progress_bar("pictures") as done:
-            pictures = save_pictures(account, folder, check, done)
-        write_page(folder / "report.html", account, [*pictures, *more], check, film, wish.commands)
+            pictures = drawn(lambda: [*save_pictures(account, folder, check, done), *more()])
+        write_page(folder / "report.html", account, pictures, check, film, wish.commands)
     return check
 
 

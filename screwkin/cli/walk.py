@@ -13,7 +13,7 @@ from screwkin.analysis.account import Account, account_of
 from screwkin.cli.compensated import CompensateBy, Passes, ServoStiffness, compensated, remedy
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, RobotName, settings
-from screwkin.cli.output import aligned, print_json, progress_bar, remark
+from screwkin.cli.output import aligned, drawn, print_json, progress_bar, remark
 from screwkin.gait.files import default_gait, load_gait
 from screwkin.gait.record import Gait
 from screwkin.gait.walk import walk as walk_of
@@ -120,7 +120,7 @@ def write_report(account: Account, folder: Path) -> Path:
     from screwkin.report.pictures import save_pictures
 
     with progress_bar("pictures") as done:
-        pictures = save_pictures(account, folder, progress=done)
+        pictures = drawn(lambda: save_pictures(account, folder, progress=done))
     return write_page(folder / "report.html", account, pictures)
 
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.scalar import Scalar, is_jax, where
+from screwkin.compiler.memory import results
 from screwkin.compiler.program import Group, Recorder
 from screwkin.compiler.run import compile_program, is_prepared, machine_code, python_function, run_rows
 from screwkin.kinematics.arrays import Argument, checked_inputs, input_rows
@@ -93,7 +94,7 @@ class Door:
         return (lambda *arrays: None) if native is None else native.checked(LIMIT, self._empty)
 
     def _empty(self, batch: tuple[int, ...]) -> tuple[Array, ...]:
-        return tuple([np.empty(batch + shape) for shape, _ in self._outputs])
+        return results(batch, [shape for shape, _ in self._outputs])
 
     @cached_property
     def _python(self) -> Callable[..., Sequence[list[float]]]:
@@ -131,7 +132,8 @@ class Door:
         return [found[group.name] for group in self.program.outputs]
 
 
-def _layouts(groups: Sequence[Group]) -> list[tuple[tuple[int, ...], Struct]]:
+def _layouts(groups: Sequence[Group]) -> list[tuple[tuple[int, ...], Any]]:
+    """Shape and packed layout of every array."""
     return [(group.shape, Struct(f"{group.size}d")) for group in groups]
 
 

@@ -193,6 +193,8 @@ class Definition:
 
     def _bound(self, args: Sequence[Any], options: Values) -> dict[str, Any]:
         """Every argument by name: as ``inspect`` binds them, in a tenth of its time."""
+        if len(args) == len(self.parameters) and not options:
+            return dict(zip(self.parameters, args, strict=True))
         values = {**self.defaults, **dict(zip(self.parameters, args, strict=False)), **options}
         twice = options and not options.keys().isdisjoint(self.parameters[: len(args)])
         if twice or len(values) != len(self.parameters) or len(args) > len(self.parameters):

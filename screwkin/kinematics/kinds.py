@@ -61,12 +61,13 @@ def _one(record: Callable[[Sequence[Scalar]], Any]) -> Callable[..., Any]:
 
 def _tip_arrays(robot: Robot, name: str, value: Any) -> tuple[tuple[Argument, ...], list[Any]]:
     """Twists of the tips that are given; for a program (True) six numbers from six joints on, else three."""
-    if value is not True and not isinstance(value, Mapping):
-        raise InputError(f"{name} is a mapping from names of tips to arrays, not {type(value).__name__}")
     if value is not True:
+        if type(value) is not dict and not isinstance(value, Mapping):
+            raise InputError(f"{name} is a mapping from names of tips to arrays, not {type(value).__name__}")
+        known = robot.tip_names
         for tip in value:
-            if tip not in robot.tip_names:
-                raise UnknownNameError("tip", str(tip), robot.tip_names)
+            if tip not in known:
+                raise UnknownNameError("tip", str(tip), known)
     arguments: list[Argument] = []
     arrays: list[Any] = []
     names: set[str] = set()

@@ -84,7 +84,7 @@ def solve_rates(mechanism: Mechanism, T_world_base: Array, q: Array, primary: Ar
     batch = values.shape[:-1]
     singular = np.zeros((*batch, len(mechanism.blocks)), dtype=bool)
     certified = least > CERTIFIED
-    if certified.all() and len(by_formula) == len(mechanism.blocks):
+    if np.count_nonzero(certified) == certified.size and len(by_formula) == len(mechanism.blocks):
         return SecondarySolution(values, singular)
     T, q, primary = flat(T_world_base, 2, batch), flat(q, 1, batch), flat(primary, 1, batch)
     rows, marks = values.reshape(len(q), -1), singular.reshape(len(q), -1)

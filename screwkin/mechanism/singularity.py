@@ -106,7 +106,7 @@ def refuse_singular(
     Raises:
         SingularError: names limb, sample, its time where times are given, and the cause.
     """
-    if not singular.any():
+    if not (np.count_nonzero(singular) if type(singular) is np.ndarray else singular.any()):
         return
     batch, blocks = singular.shape[:-1], singular.shape[-1]
     sample, block = (int(i) for i in np.argwhere(np.reshape(singular, (-1, blocks)))[0])

@@ -14,7 +14,7 @@ from typing import Any
 
 from screwkin.algebra.scalar import Scalar, is_symbolic
 from screwkin.algebra.se3 import ZERO, Twist, Vector, as_array, leaves, map_scalars
-from screwkin.errors import InputError
+from screwkin.errors import InputError, needed_for
 from screwkin.kinematics.positions import joint_twists, link_displacements, pose_in_base
 from screwkin.mechanism.chains import chain_screws
 from screwkin.mechanism.mechanism import Mechanism, unchosen
@@ -116,7 +116,8 @@ def symbolic_loops(robot: Robot) -> tuple[SymbolicLimb, ...]:
 
 def named_formulas(robot: Robot) -> Robot:
     """The robot with parameters that are roots or inverse functions of others as symbols of their names."""
-    import sympy
+    with needed_for("a symbolic model"):
+        import sympy
 
     hard = (sympy.asin, sympy.acos, sympy.atan, sympy.atan2)
     formulas = [

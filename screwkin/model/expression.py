@@ -16,7 +16,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from screwkin.algebra.scalar import Scalar, is_symbolic
-from screwkin.errors import Fault, InputError, near
+from screwkin.errors import Fault, InputError, near, needed_for
 
 CONSTANTS = ("pi", "deg", "mm")
 """Names that every table knows: pi, one degree in rad, one millimetre in m."""
@@ -251,7 +251,8 @@ _FLOATS = SimpleNamespace(
 
 def _symbols() -> SimpleNamespace:
     """The same for sympy, where 1/2 stays a half and pi stays pi."""
-    import sympy
+    with needed_for("a symbolic table"):
+        import sympy
 
     functions = {name: getattr(sympy, name) for name in _ARITY if name != "abs"}
     functions |= {"abs": sympy.Abs, "min": sympy.Min, "max": sympy.Max}
@@ -260,6 +261,7 @@ def _symbols() -> SimpleNamespace:
 
 
 def _symbol(name: str) -> Scalar:
-    import sympy
+    with needed_for("a symbolic table"):
+        import sympy
 
     return sympy.Symbol(name, real=True)

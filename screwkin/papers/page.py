@@ -45,11 +45,20 @@ def check_pictures(paper: Paper) -> None:
 
 
 def draw_pictures(
-    paper: Paper, bench: Bench, folder: Path, progress: Callable[[float], None] = lambda share: None
+    paper: Paper,
+    bench: Bench,
+    folder: Path,
+    progress: Callable[[float], None] = lambda share: None,
+    left_out: Callable[[Path, MissingDependencyError], None] = lambda path, error: None,
 ) -> list[list[Drawn]]:
     """Draw and write the pictures of every section, with few colours so that files stay small.
 
-    A picture that needs a package which is not installed is left out.
+    Args:
+        paper: from ``load_paper``.
+        bench: where robots, walks and studies are computed and cached.
+        folder: for the pictures.
+        progress: called with the share of pictures done.
+        left_out: called with every picture that needs a library which is not installed, and the error.
 
     Raises:
         OutputError: a file cannot be written.
@@ -63,8 +72,8 @@ def draw_pictures(
             try:
                 _draw(picture, bench, path)
                 shown.append(Drawn(path, picture.caption))
-            except MissingDependencyError:
-                pass
+            except MissingDependencyError as error:
+                left_out(path, error)
             done += 1
             progress(done / total)
         drawn.append(shown)

@@ -12,12 +12,13 @@ from screwkin.analysis.account import Account
 from screwkin.dynamics.support import convex_hull
 from screwkin.kinematics.positions import link_displacements
 from screwkin.model.robot import Robot
-from screwkin.report.style import Axes, Figure, limb_colours, new_figure
+from screwkin.report.style import Axes, Figure, joint_colours, new_figure
 from screwkin.sim.camera import Camera
 from screwkin.sim.render import pictures
 from screwkin.sim.run import Run
 
 ROWS, COLUMNS = 2, 3
+GREY = "#8A8F98"
 
 
 def frame_times(account: Account) -> Array:
@@ -53,7 +54,8 @@ def frames_drawn(account: Account) -> Figure:
     outlines = [_outlines(robot, trajectory.T_world_base[i], trajectory.q[i]) for i in samples]
     reach = max(np.abs(outline[:, 0]).max() for frame in outlines for _, _, outline in frame)
     top = max(outline[:, 1].max() for frame in outlines for _, _, outline in frame)
-    colours = _link_colours(account)
+    of_joint = joint_colours(account, GREY)
+    colours = {robot.base_link: GREY} | {j.child: of_joint[j.name] for j in robot.joints}
     for one, i, frame in zip(axes.flat, samples, outlines, strict=True):
         _draw(one, frame, colours)
         one.set_xlim(-1.1 * reach, 1.1 * reach)
@@ -107,12 +109,3 @@ def _solids(robot: Robot, name: str) -> list[Array]:
     ends = [as_array(joint.screw.s0) for joint in robot.joints if joint.parent == name]
     ends += [as_array(limb.frame.p) for limb in robot.limbs if limb.link == name]
     return [np.stack([start, end]) for end in ends if np.linalg.norm(end - start) > 1e-6]
-
-
-def _link_colours(account: Account) -> dict[str, str]:
-    """Limbs in their colours, all else in grey."""
-    colours = dict.fromkeys(account.robot.link_names, "#8A8F98")
-    for limb in account.robot.limbs:
-        for i in account.robot.path_to(limb.link):
-            colours[account.robot.joints[i].child] = limb_colours(account)[limb.name]
-    return colours

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from screwkin.analysis.account import Account
+from screwkin.model.robot import Limb, Robot
 from screwkin.report.style import (
     LINES,
     WAIST,
@@ -78,18 +79,22 @@ def joint_angles(account: Account, kind: str = "leg") -> Figure | None:
         return None
     figure, _ = time_figure(account, 0.9 + 2.3 * len(limbs), len(limbs), sharey=True)
     for limb, one in zip(limbs, figure.axes, strict=True):
-        joints = robot.path_to(limb.link)
-        common = common_prefix([robot.joints[i].name for i in joints])
-        for k, i in enumerate(joints):
+        for k, (i, name, colour) in enumerate(joints_shown(robot, limb)):
             revolute = robot.joints[i].type != "prismatic"
             value = np.degrees(trajectory.q[:, i]) if revolute else 1e3 * trajectory.q[:, i]
-            name = shown(robot.joints[i].name[len(common) :])
-            one.plot(trajectory.time, value, color=HUES[k % len(HUES)], linestyle=LINES[k % 2], label=name)
+            one.plot(trajectory.time, value, color=colour, linestyle=LINES[k % 2], label=name)
         one.set_ylabel(f"{shown(limb.name)} [deg]")
     return finished(figure, account, columns=4)
 
 
 HUES = ("#222222", "#56B4E9", "#CC79A7", "#009E73", "#E69F00", "#0072B2")
+
+
+def joints_shown(robot: Robot, limb: Limb) -> list[tuple[int, str, str]]:
+    """Index, name without the limb's side, and colour of every joint of a limb."""
+    path = robot.path_to(limb.link)
+    common = len(common_prefix([robot.joint_names[i] for i in path]))
+    return [(i, shown(robot.joint_names[i][common:]), HUES[k % len(HUES)]) for k, i in enumerate(path)]
 
 
 def common_prefix(names: list[str]) -> str:

@@ -6,7 +6,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.analysis.account import Account
-from screwkin.report.motion import HUES, common_prefix
+from screwkin.report.motion import joints_shown
 from screwkin.report.style import PLAIN, Axes, Figure, legend_above, shown, time_figure
 from screwkin.servo.log import PlayLog
 
@@ -21,14 +21,10 @@ def tracking(account: Account, log: PlayLog) -> Figure:
     figure, _ = time_figure(account, 0.9 + 2.3 * rows, rows)
     *panels, last = figure.axes
     for limb, one in zip(legs, panels, strict=True):
-        joints = robot.path_to(limb.link)
-        common = common_prefix([robot.joints[i].name for i in joints])
-        for k, i in enumerate(joints):
-            colour = HUES[k % len(HUES)]
+        for i, name, colour in joints_shown(robot, limb):
             one.plot(time, np.degrees(log.command[:, i]), color=colour, linewidth=0.9)
             one.plot(
-                read[:, i], np.degrees(log.position[:, i]), ".", color=colour, markersize=2.6,
-                label=shown(robot.joints[i].name[len(common) :]),
+                read[:, i], np.degrees(log.position[:, i]), ".", color=colour, markersize=2.6, label=name,
             )  # fmt: skip
         one.set_ylabel(f"{shown(limb.name)} [deg]")
     _errors(last, log, read)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from screwkin.analysis.account import Account
@@ -16,8 +14,8 @@ from screwkin.report.style import (
     Axes,
     Figure,
     finished,
+    joint_colours,
     legend_above,
-    limb_colours,
     new_figure,
     shown,
     time_figure,
@@ -76,7 +74,7 @@ def servo_use(account: Account, check: Validation) -> Figure:
     """Largest torque and speed of every joint, as shares of its servo's limits."""
     names = account.robot.joint_names
     figure, axes = new_figure(0.9 + 0.2 * len(names), 1, 2, sharey=True)
-    colours = _joint_colours(account)
+    colours = joint_colours(account)
     shares: tuple[tuple[Axes, dict[str, float], str], ...] = (
         (axes[0], check.torque_use, "torque [% of limit], largest 50 ms mean"),
         (axes[1], check.speed_use, "planned speed [% of limit]"),
@@ -94,14 +92,6 @@ def servo_use(account: Account, check: Validation) -> Figure:
     axes[0].set_yticks(range(len(names)), [shown(name) for name in names], fontsize=8)
     axes[0].invert_yaxis()
     return figure
-
-
-def _joint_colours(account: Account) -> dict[str, Any]:
-    colours: dict[str, Any] = dict.fromkeys(account.robot.joint_names, PLAIN)
-    for limb in account.robot.limbs:
-        for i in account.robot.path_to(limb.link):
-            colours[account.robot.joints[i].name] = limb_colours(account)[limb.name]
-    return colours
 
 
 def _mark_fall(axes: Axes, check: Validation) -> None:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from screwkin.analysis.account import Account
+from screwkin.errors import needed_for
 from screwkin.files import atomic_path
 
 Figure = Any
@@ -53,8 +54,13 @@ STYLE: Mapping[str, Any] = {
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Pictures drawn inside have the style; nothing global remains changed."""
-    import matplotlib
+    """Pictures drawn inside have the style; nothing global remains changed.
+
+    Raises:
+        MissingDependencyError: matplotlib is not installed.
+    """
+    with needed_for("a picture"):
+        import matplotlib
 
     style: Any = dict(STYLE)
     with matplotlib.rc_context(style):
@@ -115,6 +121,13 @@ def limb_colours(account: Account) -> dict[str, str]:
         names = [limb.name for limb in account.robot.limbs if limb.kind == kind]
         colours |= {name: SIDES[k % len(SIDES)] for k, name in enumerate(names)}
     return colours
+
+
+def joint_colours(account: Account, others: str = PLAIN) -> dict[str, str]:
+    """Colour of every joint: its limb's."""
+    robot, of_limb = account.robot, limb_colours(account)
+    own = {robot.joint_names[i]: of_limb[limb.name] for limb in robot.limbs for i in robot.path_to(limb.link)}
+    return {**dict.fromkeys(robot.joint_names, others), **own}
 
 
 def shade_swings(axes: Axes, account: Account) -> None:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, Literal
 
-from screwkin.errors import InputError, MissingDependencyError, ScrewkinError
+from screwkin.errors import InputError, ScrewkinError, needed_for
 from screwkin.servo.line import (
     BROADCAST,
     REFUSED,
@@ -318,14 +318,11 @@ def open_line(port: str, baud: int = 1_000_000, rs485: bool = False) -> ByteLine
 
     Raises:
         PortError: not there, not allowed, in use, or no such baud rate; lists the ports that are there.
+        MissingDependencyError: pyserial is not installed.
     """
-    try:
+    with needed_for("a serial port"):
         import serial
         from serial.rs485 import RS485Settings
-    except ImportError:
-        raise MissingDependencyError(
-            "pyserial is not installed; install it with: pip install pyserial"
-        ) from None
     try:
         line = serial.Serial(port, baud, timeout=0, write_timeout=0.1, exclusive=True)
         if rs485:
@@ -347,12 +344,8 @@ def port_names() -> tuple[str, ...]:
 
 
 def _driver() -> Any:
-    try:
+    with needed_for("a servo bus"):
         import dynamixel_sdk
-    except ImportError:
-        raise MissingDependencyError(
-            "dynamixel-sdk is not installed; install it with: pip install dynamixel-sdk"
-        ) from None
     return dynamixel_sdk
 
 

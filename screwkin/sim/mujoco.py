@@ -20,7 +20,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array
-from screwkin.errors import InputError, MissingDependencyError
+from screwkin.errors import InputError, needed_for
 from screwkin.model.robot import Joint, Robot
 from screwkin.model.state import State
 from screwkin.sim.backend import Command, Contact, Observation, moment_about_origin
@@ -89,7 +89,7 @@ class MuJoCoBackend:
         self.dt = self._physics.dt
         self._servos = servos or RigidServos(robot)
         self.servo = self._servos.name
-        self._mj = mj = _imported_mujoco()
+        self._mj = mj = mujoco_library()
         bodies, remarks = bodies_of(robot)
         self.settings: Mapping[str, Any] = {**asdict(self._physics), "remarks": list(remarks)}
         spec = _world(mj, self._physics)
@@ -355,13 +355,14 @@ def _check_joints(robot: Robot) -> None:
         )
 
 
-def _imported_mujoco() -> Any:
-    try:
+def mujoco_library() -> Any:
+    """The module ``mujoco``.
+
+    Raises:
+        MissingDependencyError: it is not installed.
+    """
+    with needed_for("a simulation in MuJoCo"):
         import mujoco
-    except ImportError:
-        raise MissingDependencyError(
-            "this simulation needs mujoco, which is not installed: python -m pip install mujoco"
-        ) from None
     return mujoco
 
 

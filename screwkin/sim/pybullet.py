@@ -360,8 +360,8 @@ def _imported_pybullet() -> Any:
             import pybullet
     except ImportError:
         raise MissingDependencyError(
-            "simulation needs pybullet, which is not installed. With Python 3.11: python -m pip install "
-            "pybullet. For newer Pythons there are no wheels; everything but simulation works there."
+            "PyBullet needs pybullet, which is not installed. With Python 3.11: python -m pip "
+            "install pybullet. For newer Pythons there are no wheels; MuJoCo simulates there."
         ) from None
     return pybullet
 

@@ -112,7 +112,7 @@ def test_what_speaks_against_a_pass_is_named(good: dict[str, Any], change: dict[
         ("end_error_share", 1.0, 0.01),
         ("slip", 1.0, 0.005),
         ("torque_share", 2.0, 0.9),
-        ("frame_deviation", 0.05, 0.001),
+        ("frame_deviation", 0.006, 0.001),
     ],
 )
 def test_weaker_criteria_are_no_verdict_of_this_version(

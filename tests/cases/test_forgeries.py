@@ -145,11 +145,11 @@ def test_the_walk_itself_is_no_forgery(sent: Callable[..., tuple[int, str]]) -> 
 
 
 def test_frames_too_far_apart_are_another_walk(sent: Callable[..., tuple[int, str]]) -> None:
-    for rate in ("1", "4", "8", "10"):
+    for rate in ("1", "4", "8", "10", "20"):
         code, err = sent(lambda path: None, "--rate", rate)
         assert code == 4
         assert f"at {rate} frames per second a limb is up to" in err
-    for rate in ("30", "50", "100", "300"):
+    for rate in ("50", "100", "300"):
         assert sent(lambda path: None, "--rate", rate)[0] == 0
 
 

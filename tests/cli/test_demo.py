@@ -91,7 +91,7 @@ def test_without_the_simulator_the_report_still_tells_the_rest(cli, monkeypatch,
     called = cli("demo", "--steps", 1, "-o", "out")
     assert called.code == 2
     assert "pip install pybullet" in called.err
-    assert "The report stops before the simulation" in called.err
+    assert "The report holds what was done so far" in called.err
     assert (tmp_path / "out" / "report.html").exists()
     assert not (tmp_path / "out" / "validation.json").exists()
 
