@@ -176,6 +176,8 @@ def judged(
         reasons=(),
         warnings=_warnings(robot, trajectory, run, slipped, speed),
         engine=run.engine,
+        engine_settings={run.engine: dict(run.settings)},
+        servo=run.servo,
         criteria=criteria,
         fell=run.fallen_at is not None,
         fell_at=run.fallen_at,
