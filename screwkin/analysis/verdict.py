@@ -230,9 +230,9 @@ def reasons_of(facts: Measured, rule: Criteria) -> tuple[str, ...]:
     tired = [f"{name} {100 * use:.0f} %" for name, use in facts.torque_use.items() if use > rule.torque_share]
     if tired:
         reasons.append(f"torque at the servo's limit for {1e3 * WINDOW:.0f} ms: {', '.join(tired)}")
-    if facts.self_collisions is None:
+    if facts.self_collisions is None and confirms(facts.engine):
         reasons.append("self-collisions were not looked for")
-    elif facts.self_collisions:
+    if facts.self_collisions:
         reasons.append(f"links collide: {', '.join(map(str, facts.self_collisions))}")
     return tuple(reasons)
 

@@ -92,15 +92,21 @@ _ARRAY: Mapping[str, Callable[..., Any]] = {
 
 def run_numpy(program: Program, inputs: Sequence[Array], outputs: Sequence[Array]) -> None:
     """Compute a batch, block by block: flat inputs (B, size) to flat outputs (B, size), which are filled."""
-    calls = _calls(program)
+    calls, numbers = _calls(program)
     for begin in range(0, len(outputs[0]), BLOCK):
         here = slice(begin, begin + BLOCK)
         values: list[Any] = [row for array in inputs for row in np.ascontiguousarray(array[here].T)]
+        values += [None] * len(calls) + numbers
         with np.errstate(all="ignore"):  # branches that are not chosen may divide by zero
-            for function, operands, spent in calls:
-                values.append(function(*[values[x] if isinstance(x, int) else x for x in operands]))
-                for spent_value in spent:
-                    values[spent_value] = None
+            for value, (function, a, b, c, spent) in enumerate(calls, program.arity):
+                if b is None:
+                    values[value] = function(values[a])
+                elif c is None:
+                    values[value] = function(values[a], values[b])
+                else:
+                    values[value] = function(values[a], values[b], values[c])
+                for place in spent:
+                    values[place] = None
         results = iter(program.results)
         for array in outputs:
             for k in range(array.shape[1]):
@@ -108,17 +114,27 @@ def run_numpy(program: Program, inputs: Sequence[Array], outputs: Sequence[Array
                 array[here, k] = values[x] if isinstance(x, int) else x
 
 
-Call = tuple[Callable[..., Any], tuple[Operand, ...], list[int]]
-"""A function, its operands, and the values that nothing needs after it."""
+Call = tuple[Callable[..., Any], int, int | None, int | None, list[int]]
+"""A function, the places of its operands, and the values that nothing needs after it."""
 
 
 @kept_with
-def _calls(program: Program) -> list[Call]:
-    """Every step as a call; what is spent makes room while its memory is warm."""
+def _calls(program: Program) -> tuple[list[Call], list[float]]:
+    """Every step as a call; what is spent makes room while its memory is warm. And the numbers.
+
+    Places are those of the values, then of the numbers.
+    """
+    first = program.arity + len(program.steps)
+    numbers: dict[str, int] = {}
     seen = {x for x in program.results if isinstance(x, int)}
     calls: list[Call] = []
     for step in reversed(program.steps):
         spent = [x for x in dict.fromkeys(step.operands) if isinstance(x, int) and x not in seen]
         seen.update(spent)
-        calls.append((_ARRAY[step.operation], step.operands, spent))
-    return calls[::-1]
+        a, *others = [
+            x if isinstance(x, int) else first + numbers.setdefault(repr(x), len(numbers))
+            for x in step.operands
+        ]
+        b, c, *_ = (*others, None, None)
+        calls.append((_ARRAY[step.operation], a, b, c, spent))
+    return calls[::-1], [float(text) for text in numbers]

@@ -16,7 +16,7 @@ Scalar = Any
 Key = tuple[Any, ...]
 """An operation and its operands: an ``int`` is the index of a node, a tuple ``(x,)`` is the number x."""
 
-COMMUTATIVE = ("add", "mul", "and", "or")
+COMMUTATIVE = frozenset(("add", "mul", "and", "or"))
 BOOLEAN = ("lt", "le", "and", "or", "not")
 
 
@@ -33,9 +33,11 @@ class Graph:
 
     def node(self, operation: str, *operands: Any) -> Node:
         """The node of an operation on operands: nodes, or Python numbers."""
-        key: Key = (operation, *(x.index if isinstance(x, Node) else (x,) for x in operands))
-        if operation in COMMUTATIVE:
-            key = (operation, *sorted(key[1:], key=lambda x: (isinstance(x, int), x)))
+        key: Key = (operation, *[x.index if type(x) is Node else (x,) for x in operands])
+        if operation in COMMUTATIVE:  # numbers first, then nodes as they were recorded
+            _, a, b = key
+            if (type(a) is int, a) > (type(b) is int, b):
+                key = operation, b, a
         found = self._known.get(key)
         if found is None:
             found = Node(self, len(self.operations))

@@ -8,6 +8,7 @@ from screwkin.analysis.workspace import map_program
 from screwkin.compiler.program import Program
 from screwkin.dynamics.quantities import balance, ground_wrench, inverse_dynamics, mass_matrix, momentum
 from screwkin.errors import UnknownNameError
+from screwkin.gait.driven import driven
 from screwkin.ik.closed import recognised
 from screwkin.ik.programs import limb_programs_of
 from screwkin.kinematics.body import (
@@ -54,12 +55,12 @@ QUANTITIES: Mapping[str, Quantity] = {
 
 
 def _walk(robot: Robot) -> list[Program]:
-    """Of a robot whose joints all move in a walk: necks and the like are held, which makes another robot."""
-    mechanism = closed_mechanism(robot)
-    limbs = solvable_limbs(robot, mechanism.secondary)
-    motion = [motion_program(robot, True, limbs)] if limbs else []
+    moving = driven(robot).moving
+    mechanism = closed_mechanism(moving)
+    limbs = solvable_limbs(moving, mechanism.secondary)
+    motion = [motion_program(moving, True, limbs)] if limbs else []
     forces = balance.definition.door(robot, balance.definition.inputs(robot), ()).guarded
-    return [*limb_programs_of(robot), *motion, block_values(robot, *mechanism.choice), forces]
+    return [*limb_programs_of(moving), *motion, block_values(moving, *mechanism.choice), forces]
 
 
 def _maps(robot: Robot) -> list[Program]:

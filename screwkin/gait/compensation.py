@@ -31,6 +31,7 @@ from screwkin.compliance.springs import StiffnessChoice, joint_stiffness
 from screwkin.compliance.stiffness import Deflection, static_deflection
 from screwkin.compliance.stiffness import Method as StaticModel
 from screwkin.errors import InputError, LimitError, NoSolutionError
+from screwkin.gait.driven import driven
 from screwkin.gait.feed_forward import walking_torques
 from screwkin.gait.loads import load_distribution
 from screwkin.ik.pose import solve_pose
@@ -234,14 +235,16 @@ def _deflection(
 
 def _reached(robot: Robot, trajectory: Trajectory, shifts: Array, guess: Array) -> Array:
     """Joint positions (T, n) with the base in place and the feet beside theirs by (T, feet, 3)."""
-    targets: dict[str, Array] = {"base": trajectory.T_world_base}
+    drive, targets = driven(robot), {"base": trajectory.T_world_base}
     for i, foot in enumerate(trajectory.feet):
         targets[foot] = trajectory.T_world_tip[foot].copy()
         targets[foot][:, :3, 3] += shifts[:, i]
-    solution = solve_pose(robot, targets, State(trajectory.T_world_base, guess))
-    solution.raise_on_failure(robot, trajectory.time)
+    solution = solve_pose(drive.moving, targets, State(trajectory.T_world_base, guess[:, drive.joints]))
+    solution.raise_on_failure(drive.moving, trajectory.time)
+    reached = guess.copy()
+    reached[:, drive.joints] = solution.state.q
     moved = (shifts != 0).any(axis=(1, 2))[:, None]
-    return np.where(moved, solution.state.q, guess)
+    return np.where(moved, reached, guess)
 
 
 def change_rates(time: Array, change: Array) -> Array:

@@ -16,6 +16,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.screws import at
 from screwkin.algebra.se3 import as_array
+from screwkin.compiler.program import kept
 from screwkin.gait.held import with_held_joints
 from screwkin.gait.stance import Stance
 from screwkin.kinematics.positions import chain_jacobian, successive_displacement
@@ -79,9 +80,17 @@ def driven(robot: Robot) -> Driven:
     Args:
         robot: with a ``home`` posture.
     """
+    moving, joints, home, resting = _moving(robot)
+    return Driven(robot, moving or robot, joints, home, resting)
+
+
+@kept
+def _moving(robot: Robot) -> tuple[Robot | None, tuple[int, ...], Array, tuple[str, ...]]:
+    """The parts of ``driven``, but None for the robot itself: what is compiled for them lasts as it does."""
     home = np.array(robot.posture("home").q, dtype=float)
+    home.flags.writeable = False
     if robot.closures:
-        return Driven(robot, robot, tuple(range(len(home))), home, ())
+        return None, tuple(range(len(home))), home, ()
     chosen = {limb.name: _chosen(robot, limb, home) for limb in robot.limbs}
     moving = {i for joints in chosen.values() for i in joints}
     rest = {joint.name: float(home[i]) for i, joint in enumerate(robot.joints) if i not in moving}
@@ -90,7 +99,7 @@ def driven(robot: Robot) -> Driven:
     if resting:
         limbs = tuple(limb for limb in reduced.limbs if limb.name not in resting)
         reduced = replace(reduced, limbs=limbs)
-    return Driven(robot, reduced, tuple(sorted(moving)), home, resting)
+    return None if reduced is robot else reduced, tuple(sorted(moving)), home, resting
 
 
 def _chosen(robot: Robot, limb: Limb, home: Array) -> tuple[int, ...]:

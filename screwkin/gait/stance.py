@@ -9,6 +9,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import IDENTITY, Pose, Vector
+from screwkin.compiler.program import kept
 from screwkin.dynamics.support import sole_corners
 from screwkin.errors import InputError, ShapeError
 from screwkin.kinematics.landmarks import limb_root, waist_frame
@@ -82,6 +83,7 @@ class Stance:
         return next(foot for foot in self.feet if foot.side == side)
 
 
+@kept
 def stance_of(robot: Robot) -> Stance:
     """What a gait must know of a robot, from its axes, tips and soles at the home posture.
 

@@ -6,16 +6,13 @@ arrays (``ik.closed.solve_closed``), so that no decision depends on the path.
 
 from __future__ import annotations
 
-from dataclasses import fields
-from typing import Any
-
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.compiler.run import run
 from screwkin.ik.closed import ClosedForm, recognised, solve_closed
 from screwkin.ik.programs import limb_branches, limb_pose
 from screwkin.ik.solutions import LimbSolutions, ordered
+from screwkin.kinematics.arrays import exact_target
 from screwkin.kinematics.serial_chain import SerialChain, residual
 from screwkin.model.records import LIMIT_TOLERANCE
 
@@ -26,7 +23,6 @@ def closed_solutions(
     chain: SerialChain,
     target: Array,
     guess: Array,
-    batch: tuple[int, ...],
     tolerances: tuple[float, float],
     least_squares: bool = True,
 ) -> LimbSolutions:
@@ -34,31 +30,31 @@ def closed_solutions(
 
     Args:
         chain: of the limb.
-        target: tip poses (B, 4, 4), or positions (B, 3), in the base frame.
-        guess: (B, n).
-        batch: shape with B samples.
+        target: tip poses (..., 4, 4), or positions (..., 3), in the base frame.
+        guess: (..., n).
         tolerances: angle [rad] and distance [m] within which limits are preferred to an exact solution.
         least_squares: seek the nearest reachable target where there is no solution.
+
+    Raises:
+        ShapeError: a wrong shape, NaN or infinity, a pose that is not rigid, or batches that do not fit.
     """
-    form = recognised(chain, target.ndim == 2)
+    position = target.shape[-2:] != (4, 4)
+    form = recognised(chain, position)
     assert form is not None
-    answer = run(limb_branches(chain, form.position), {"target": target, "guess": guess})
-    kind, certified = answer["kind"], answer["certified"][:, 0] > 0.5
-    steps = np.ones(kind.shape, dtype=int)
-    solutions = LimbSolutions(
-        chain.limb, chain.names, "closed", answer["q"], kind > 0.5, kind > 1.5, answer["error"], steps, chain
-    )
+    q, error, kind, certified = limb_branches(chain, position)((target, guess))
+    valid, inside, steps = kind > 0.5, kind > 1.5, np.ones(kind.shape, dtype=int)
+    solutions = LimbSolutions(chain.limb, chain.names, "closed", q, valid, inside, error, steps, chain)
+    open_ = certified[..., 0] < 0.5
     slack = max(tolerances)
-    if slack > LIMIT_TOLERANCE:
-        certified &= (kind[:, 0] > 1.5) | (chain.excess(answer["q"][:, 0]) > slack)
-    again = np.flatnonzero(~certified)
-    if len(again):
-        part = _certified(form, target[again], guess[again], tolerances, least_squares)
+    if slack > LIMIT_TOLERANCE and not inside[..., 0].all():
+        open_ |= ~inside[..., 0] & (chain.excess(q[..., 0, :]) <= slack)
+    if open_.any():
+        own = np.broadcast_to(target, (*open_.shape, *((3,) if position else (4, 4))))[open_]
+        near = np.broadcast_to(guess, (*open_.shape, guess.shape[-1]))[open_]
+        part = _certified(form, exact_target("T_base_tip", own), near, tolerances, least_squares)
         for name in KINDS:
-            getattr(solutions, name)[again] = getattr(part, name)
-    arrays: dict[str, Any] = {f.name: getattr(solutions, f.name) for f in fields(solutions)}
-    shaped = {n: a.reshape(*batch, *a.shape[1:]) for n, a in arrays.items() if isinstance(a, np.ndarray)}
-    return LimbSolutions(**(arrays | shaped))
+            getattr(solutions, name)[open_] = getattr(part, name)
+    return solutions
 
 
 def _certified(
@@ -115,16 +111,18 @@ def closed_pose(
         tolerances: angle [rad] and distance [m] within which limits are preferred to an exact solution.
 
     Returns:
-        q (B, n); error (B,) [m and rad]; inside (B,) bool: within the limits; certified (B,) bool: a regular
-        solution that no rounding changes. Where it is False the others hold nothing.
+        q (B, n); error (B,) [m and rad]; inside (B,) bool: within the limits; open (B,) bool: False for a
+        regular solution that no rounding changes. Where it is True the others hold nothing.
+
+    Raises:
+        ShapeError: NaN or infinity, or a pose that is not rigid.
     """
-    program = limb_pose(chain, target.ndim == 2)
-    answer = run(program, {"T_world_base": T_world_base, "target": target, "guess": guess})
-    inside, certified = (answer[name][:, 0] > 0.5 for name in ("inside", "certified"))
+    q, error, within, certified = limb_pose(chain, target.ndim == 2)((T_world_base, target, guess))
+    inside, open_ = within[:, 0] > 0.5, certified[:, 0] < 0.5
     slack = max(tolerances)
-    if slack > LIMIT_TOLERANCE:
-        certified &= inside | (chain.excess(answer["q"]) > slack)
-    return answer["q"], answer["error"][:, 0], inside, certified
+    if slack > LIMIT_TOLERANCE and not inside.all():
+        open_ |= ~inside & (chain.excess(q) <= slack)
+    return q, error[:, 0], inside, open_
 
 
 def certified_pose(chain: SerialChain, target: Array, guess: Array, tolerances: tuple[float, float]) -> Array:

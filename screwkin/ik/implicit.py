@@ -23,6 +23,7 @@ from screwkin.ik import whole_body as poses
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.pose_solution import PoseSolution
 from screwkin.ik.solutions import LimbSolutions
+from screwkin.kinematics.arrays import checked, exact_target, one_batch
 from screwkin.kinematics.serial_chain import SerialChain, forward
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
@@ -39,17 +40,18 @@ def limb_in_jax(
     method: limbs.Method,
     guess: Any,
     settings: IkSettings,
-    batch: tuple[int, ...],
     least_squares: bool,
 ) -> LimbSolutions:
-    """As ``limb_ik``, for JAX arrays, perhaps traced, that broadcast to a batch."""
+    """As ``limb_ik``, for JAX arrays, perhaps traced."""
     register_with_jax()
     inner = (poses.axes_of(target), 1)
+    target = checked("T_base_tip", target, *((4, 4) if inner[0] == 2 else (3,)))
+    guess = checked("guess", guess, len(chain.names))
+    batch = one_batch({"T_base_tip": (target, inner[0]), "guess": (guess, 1)})
     shapes = (target.shape[target.ndim - inner[0] :], guess.shape[-1:])
 
     def solve(target: Any, guess: Any) -> LimbSolutions:
-        here = guess.shape[:-1]
-        return limbs.solve_limb_arrays(chain, target, method, guess, settings, here, least_squares)
+        return limbs.solve_limb_arrays(chain, target, method, guess, settings, least_squares)
 
     def values(*inputs: Any) -> Values:
         solutions = solve(*map(np.asarray, inputs))
@@ -85,7 +87,7 @@ def pose_in_jax(
 
     def solve(*inputs: Any) -> PoseSolution:
         *tips, q = map(np.asarray, inputs)
-        wanted = {name: poses.exact(f"targets[{name!r}]", x) for name, x in zip(names, tips, strict=True)}
+        wanted = {name: exact_target(f"targets[{name!r}]", x) for name, x in zip(names, tips, strict=True)}
         return poses.solve_whole_body(robot, wanted, q, q.shape[:-1], method, settings)
 
     def values(*inputs: Any) -> Values:

@@ -12,9 +12,10 @@ from screwkin.errors import InputError
 from screwkin.ik.methods import Method, solve_limb_arrays
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.solutions import LimbSolutions
-from screwkin.kinematics.arrays import checked, one_batch
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.model.robot import Robot, refuse_closures
+
+DEFAULT = IkSettings()
 
 
 def limb_ik(
@@ -52,8 +53,8 @@ def limb_ik(
 
     Raises:
         UnknownNameError: no such limb.
-        ShapeError: wrong shape, NaN or infinity.
-        InputError: a pose that is none, an unknown method, or one that does not fit the limb (for
+        ShapeError: wrong shape, NaN or infinity, or a pose that is not rigid.
+        InputError: an unknown method, or one that does not fit the limb (for
             ``"closed"`` the message says what the limb's geometry lacks); or the robot has closures.
 
     Example:
@@ -70,16 +71,12 @@ def limb_ik(
         raise InputError(f"method is {method!r}; valid: {', '.join(get_args(Method))}")
     refuse_closures(robot, "limb_ik", "use close_loops")
     chain = SerialChain.of(robot, limb)
-    poses = np.shape(T_base_tip)[-2:] == (4, 4)
-    settings = settings or IkSettings()
-    target = checked("T_base_tip", T_base_tip, *((4, 4) if poses else (3,)))
-    start = checked("guess", resting(robot, chain) if guess is None else guess, len(chain.names))
-    batch = one_batch({"T_base_tip": (target, 2 if poses else 1), "guess": (start, 1)})
-    if is_jax(target) or is_jax(start):
+    settings, start = settings or DEFAULT, resting(robot, chain) if guess is None else guess
+    if is_jax(T_base_tip) or is_jax(start):
         from screwkin.ik.implicit import limb_in_jax
 
-        return limb_in_jax(chain, target, method, start, settings, batch, least_squares)
-    return solve_limb_arrays(chain, target, method, start, settings, batch, least_squares)
+        return limb_in_jax(chain, T_base_tip, method, start, settings, least_squares)
+    return solve_limb_arrays(chain, T_base_tip, method, start, settings, least_squares)
 
 
 def resting(robot: Robot, chain: SerialChain) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -14,29 +14,49 @@ from screwkin.ik.hybrid import hybrid_seed
 from screwkin.ik.numeric import IkSettings, Numeric, arrived, solve_system
 from screwkin.ik.solutions import LimbSolutions, ordered
 from screwkin.ik.system import System
-from screwkin.kinematics.rigid import nearest_poses
+from screwkin.kinematics.arrays import checked, exact_target, of_shape, one_batch
 from screwkin.kinematics.serial_chain import SerialChain
-from screwkin.model.state import RIGID
 
 Method = Literal["auto", "closed", "hybrid", "newton", "lm", "dls", "pinv"]
 
 
 def solve_limb_arrays(
     chain: SerialChain,
-    target: Array,
+    target: Any,
     method: Method,
-    guess: Array,
+    guess: Any,
     settings: IkSettings,
-    batch: tuple[int, ...],
     least_squares: bool,
 ) -> LimbSolutions:
-    """As ``limb_ik``, for NumPy arrays that broadcast to a batch."""
-    shape = (4, 4) if target.shape[-2:] == (4, 4) else (3,)
-    target = rigid(target) if shape == (4, 4) else target
-    count, n = int(np.prod(batch)), guess.shape[-1]
+    """As ``limb_ik``, for whatever NumPy takes."""
+    shape = (4, 4) if np.shape(target)[-2:] == (4, 4) else (3,)
+    n = len(chain.names)
+    target, guess = of_shape("T_base_tip", target, *shape), of_shape("guess", guess, n)
+    if _chosen(chain, method, shape == (3,)) == "closed":
+        return closed_solutions(chain, target, guess, settings.tolerances, least_squares)
+    target, guess = exact_target("T_base_tip", checked("T_base_tip", target)), checked("guess", guess)
+    batch = one_batch({"T_base_tip": (target, len(shape)), "guess": (guess, 1)})
+    count = int(np.prod(batch))
     flat = np.broadcast_to(target, (*batch, *shape)).reshape(count, *shape)
     flat_guess = np.broadcast_to(guess, (*batch, n)).reshape(count, n)
     return solve_limb(chain, flat, method, flat_guess, settings, batch, least_squares)
+
+
+def _chosen(chain: SerialChain, method: Method, position: bool) -> Literal["closed", "hybrid"] | Numeric:
+    """The method; of ``"auto"`` the closed form where there is one, else newton.
+
+    Raises:
+        InputError: the limb has no closed form, but the method is ``"closed"``.
+    """
+    if method == "auto":
+        return "closed" if recognised(chain, position) else "newton"
+    if method == "closed" and not recognised(chain, position):
+        if position:
+            raise InputError(
+                "method closed needs poses (..., 4, 4); positions (..., 3) of this limb need a numeric method"
+            )
+        closed_form(chain, position)  # it says why there is none
+    return method
 
 
 def solve_limb(
@@ -63,39 +83,16 @@ def solve_limb(
         InputError: the method does not fit the limb or the target.
     """
     position = target.ndim == 2
-    if method == "auto":
-        method = "closed" if recognised(chain, position) else "newton"
-    if method == "closed":
-        if position and not recognised(chain, True):
-            raise InputError(
-                "method closed needs poses (..., 4, 4); positions (..., 3) of this limb need a numeric method"
-            )
-        if not recognised(chain, position):
-            closed_form(chain, position)  # it says why there is none
-        return closed_solutions(chain, target, guess, batch, settings.tolerances, nearest)
-    if method == "hybrid" and position:
+    chosen = _chosen(chain, method, position)
+    if chosen == "closed":
+        return closed_solutions(chain, target, guess, settings.tolerances, nearest)
+    if chosen == "hybrid" and position:
         raise InputError("method hybrid needs poses (..., 4, 4); positions (..., 3) need another method")
-    start = hybrid_seed(chain, target, guess) if method == "hybrid" else guess
-    solver: Numeric = settings.finish if method == "hybrid" else method
+    start = hybrid_seed(chain, target, guess) if chosen == "hybrid" else guess
+    solver: Numeric = settings.finish if chosen == "hybrid" else chosen
     system = System([chain], [target])
     q, iterations = solve_system(system, solver, start, settings)
     lack, _ = system.residual(q, np.arange(len(q)))
     one = (slice(None), None)
     error, valid = np.linalg.norm(lack, axis=1), arrived(system, lack, settings)
-    return ordered(chain, method, q[one], valid[one], error[one], iterations[one], guess, batch)
-
-
-def rigid(T: Array) -> Array:
-    """Poses (..., 4, 4) with their rotations made exact to the last digit.
-
-    Raises:
-        InputError: a matrix is no pose.
-    """
-    wrong, exact = nearest_poses(T)
-    if wrong.size and wrong.max() > RIGID:
-        sample = int(wrong.argmax())
-        raise InputError(
-            f"T_base_tip, sample {sample}, is no pose: its upper left 3 x 3 must be a rotation and its last "
-            "row 0 0 0 1"
-        )
-    return exact
+    return ordered(chain, chosen, q[one], valid[one], error[one], iterations[one], guess, batch)

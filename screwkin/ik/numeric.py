@@ -2,34 +2,32 @@
 
 All samples are iterated at once; those that have arrived rest. ``pinv`` and ``dls`` are the plain iterations
 of paper B on the unscaled Jacobian (rows in rad and m); ``lm`` and ``newton`` divide lengths by the limb's
-size. What has not arrived inside the limits is begun anew from a fixed set of other starts.
+size. What has not arrived inside the limits is begun anew from fixed other starts, by bounded least squares.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import Literal, get_args
 
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.algebra.newton import newton, solved
+from screwkin.algebra.bounded import bounded_least_squares
+from screwkin.algebra.newton import Residual, newton, solved
 from screwkin.errors import InputError
-from screwkin.ik.system import Bounded, System
+from screwkin.ik.starts import ROUND, later_starts
+from screwkin.ik.system import System
 
 Numeric = Literal["newton", "lm", "dls", "pinv"]
 
 CUT = 1e-15
 """Singular values below this share of the largest are dropped by the pseudoinverse: hardly any is."""
-BEND = 0.3
-"""How far the second start is from the guess [rad]: it leaves the saddle of a straight limb."""
-HOPELESS = 12
-"""Starts after which a sample that has arrived from none of them is given up."""
-PLAIN = 3
-"""Every third start iterates as the first does; the others never leave the limits."""
-LATER = 100
-"""Bound on the steps from every start but the first: most that arrive do so in 20."""
+FREE = 3
+"""Every third start may leave the limits: it shows whether a target is reached beyond them."""
+LATER = 60
+"""Bound on the steps from every start but the first: most that arrive do so in 15."""
 BETTER = 0.99
 """Share of the residual below which the end of a later start replaces that of an earlier one."""
 
@@ -46,7 +44,7 @@ class IkSettings:
         gain: share of the step that ``pinv`` and ``dls`` take.
         finish: the numeric method that ``hybrid`` continues with.
         starts: number of starts, the guess first, for samples that do not arrive inside the limits; the
-            others are fixed: next to the guess, then evenly spread within the limits.
+            others are fixed: next to the guess, then within the limits where the tips are near their targets.
     """
 
     position_tolerance: float = 1e-10
@@ -55,7 +53,7 @@ class IkSettings:
     damping: float = 0.01
     gain: float = 1.0
     finish: Numeric = "newton"
-    starts: int = 20
+    starts: int = 64
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -93,20 +91,24 @@ def solve_system(system: System, method: Numeric, guess: Array, settings: IkSett
 
     Args:
         system: n joints.
-        method: how to iterate.
+        method: how to iterate from the guess.
         guess: (B, n), the first start.
         settings: tolerances and the like.
 
     Returns:
         x (B, n), and the steps (B,) from the start that led there.
     """
-    best = _ended(system, method, guess, settings)
-    later = replace(settings, max_iterations=min(settings.max_iterations, LATER))
-    for k in range(1, settings.starts):
-        at = np.flatnonzero(best.rank == 1 if k >= HOPELESS else best.rank > 0)
+    best = _ended(system, settings, *_METHODS[method](system, guess, settings))
+    starts = np.empty((ROUND, *guess.shape))
+    for k in range(settings.starts - 1):
+        at = np.flatnonzero(best.rank > 0)
         if not len(at):
             break
-        end = _ended(system.part(at), method, start(system, guess[at], k), later, k % PLAIN != 0)
+        number, row = divmod(k, ROUND)
+        part = system.part(at)
+        if row == 0:
+            starts[:, at] = later_starts(part, guess[at], number)
+        end = _ended(part, settings, *_bounded(part, starts[row, at], settings, k % FREE == FREE - 1))
         better = end.rank < best.rank[at]
         nearer = _far(system, end.x, guess[at]) < _far(system, best.x[at], guess[at])
         better |= (end.rank == 1) & (best.rank[at] == 1) & nearer
@@ -122,26 +124,6 @@ def _far(system: System, x: Array, guess: Array) -> Array:
     return np.asarray((apart**2).sum(axis=1))
 
 
-def start(system: System, guess: Array, k: int) -> Array:
-    """The start (B, n) number k: near the guess for k = 1, then spread evenly within the limits.
-
-    Source: the additive recurrence of Roberts (2018), a generalised golden ratio.
-    """
-    n = guess.shape[1]
-    ratio = 2.0
-    for _ in range(60):
-        ratio = (1 + ratio) ** (1 / (n + 1))
-    share = (0.5 + k * ratio ** -np.arange(1.0, n + 1)) % 1.0
-    reach = np.where(system.turning, np.pi, system.length)
-    low = np.where(np.isfinite(system.lower), system.lower, np.minimum(-reach, system.upper - 2 * reach))
-    high = np.where(np.isfinite(system.upper), system.upper, np.maximum(reach, low + 2 * reach))
-    if k > 1:
-        return np.broadcast_to(low + share * (high - low), guess.shape).copy()
-    bend = BEND * np.where(system.turning, 1.0, system.length) * (0.5 + share)
-    inward = np.where(guess + bend <= high, bend, -bend)
-    return guess + inward
-
-
 def arrived(system: System, lack: Array, settings: IkSettings) -> Array:
     """(B,) bool: a residual (B, m) is within both tolerances, for every limb."""
     good = np.ones(len(lack), dtype=bool)
@@ -152,16 +134,8 @@ def arrived(system: System, lack: Array, settings: IkSettings) -> Array:
     return good
 
 
-def _ended(
-    system: System, method: Numeric, start: Array, settings: IkSettings, bounded: bool = False
-) -> _Ends:
-    """Iterations from one start, their end put inside the limits where the tolerances allow it."""
-    if bounded:
-        inside = Bounded(system.chains, system.targets)
-        u, iterations = _METHODS[method](inside, system.variables(start), settings)
-        x = system.inner(u)[0]
-    else:
-        x, iterations = _METHODS[method](system, start, settings)
+def _ended(system: System, settings: IkSettings, x: Array, iterations: Array) -> _Ends:
+    """Where iterations have ended, x put inside the limits where the tolerances allow it."""
     x = system.wrapped(x)
     everyone = np.arange(len(x))
     lack, _ = system.residual(x, everyone)
@@ -224,14 +198,31 @@ def _lm(system: System, x: Array, settings: IkSettings) -> tuple[Array, Array]:
 
 def _newton(system: System, x: Array, settings: IkSettings) -> tuple[Array, Array]:
     """The safeguarded Newton method of ``algebra.newton``."""
+    result = newton(_weighted(system), x, _tolerance(system, settings), settings.max_iterations)
+    return result.x, result.iterations
+
+
+def _bounded(system: System, x: Array, settings: IkSettings, free: bool) -> tuple[Array, Array]:
+    """Bounded least squares within the limits, or without any."""
+    wide = np.inf if free else 0.0
+    low, high = system.lower - wide, system.upper + wide
+    steps = min(settings.max_iterations, LATER)
+    result = bounded_least_squares(_weighted(system), x, low, high, _tolerance(system, settings), steps)
+    return result.x, result.iterations
+
+
+def _weighted(system: System) -> Residual:
+    """The residual with its lengths divided by the limbs' size."""
 
     def residual(x: Array, samples: Array) -> tuple[Array, Array]:
         lack, J = system.residual(x, samples)
         return lack * system.weights, J * system.weights[:, None]
 
-    tolerance = min(settings.rotation_tolerance, settings.position_tolerance / system.length)
-    result = newton(residual, x, tolerance, settings.max_iterations)
-    return result.x, result.iterations
+    return residual
+
+
+def _tolerance(system: System, settings: IkSettings) -> float:
+    return min(settings.rotation_tolerance, settings.position_tolerance / system.length)
 
 
 _METHODS = {"pinv": _pinv, "dls": _dls, "lm": _lm, "newton": _newton}

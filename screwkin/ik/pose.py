@@ -7,17 +7,16 @@ joints together, by Newton's method. Joints that no target needs rest at the gue
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any, get_args
 
 import numpy as np
 
 from screwkin.algebra.scalar import is_jax
-from screwkin.errors import InputError, UnknownNameError
+from screwkin.errors import InputError, ShapeError, UnknownNameError
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.pose_solution import PoseSolution
-from screwkin.ik.whole_body import PRECISE, Method, axes_of, exact, solve_whole_body
-from screwkin.kinematics.arrays import checked, one_batch
+from screwkin.ik.whole_body import PRECISE, Method, axes_of, solve_whole_body
+from screwkin.kinematics.arrays import checked, exact_target, of_shape, one_batch
 from screwkin.model.robot import Robot, refuse_closures
 from screwkin.model.state import State, home
 
@@ -42,9 +41,9 @@ def solve_pose(
             orientation free; world frame [m].
         guess: a nearby state; default ``home``. Its base pose holds where ``"base"`` is not given.
         method: ``"auto"``: closed forms of limbs where they have some, else Newton's method; ``"newton"``:
-            always that, from the guess and from further starts where it does not arrive within the limits.
+            always that. Where it does not arrive within the limits, further starts by bounded least squares.
         settings: tolerances and number of starts; within the tolerances a solution inside the limits is
-            preferred to a more exact one outside. Default: 1e-12, 20 starts.
+            preferred to a more exact one outside. Default: 1e-12, 64 starts.
 
     Returns:
         PoseSolution with ``.state .status .residual .iterations`` (..., limbs). Nothing is raised for samples
@@ -76,7 +75,7 @@ def solve_pose(
         if name != "base" and name not in robot.tip_names:
             raise UnknownNameError("target", name, ("base", *robot.tip_names))
         shape = (4, 4) if np.shape(value)[-2:] == (4, 4) or name == "base" else (3,)
-        wanted[name] = checked(labels[name], value, *shape)
+        wanted[name] = of_shape(labels[name], value, *shape)
     if len(wanted) < 2:
         raise InputError("no targets; name at least one tip, such as " + ", ".join(robot.tip_names[:2]))
     q = checked("guess.q", guess.q, len(robot.joints))
@@ -85,8 +84,11 @@ def solve_pose(
     if is_jax(q) or any(map(is_jax, wanted.values())):
         from screwkin.ik.implicit import pose_in_jax
 
-        return pose_in_jax(robot, wanted, q, batch, method, settings)
-    rigid = {name: exact(labels[name], a) for name, a in wanted.items()}
-    solution = solve_whole_body(robot, rigid, q, batch, method, settings)
-    base = np.broadcast_to(wanted["base"], (*batch, 4, 4))
-    return replace(solution, state=State(base, solution.state.q))
+        rigid = {name: checked(labels[name], target) for name, target in wanted.items()}
+        return pose_in_jax(robot, rigid, q, batch, method, settings)
+    try:
+        return solve_whole_body(robot, wanted, q, batch, method, settings)
+    except ShapeError:  # once more by the caller's names
+        for name, target in wanted.items():
+            exact_target(labels[name], checked(labels[name], target))
+        raise

@@ -1,7 +1,7 @@
 """Programs of limbs with closed forms: all branches in order, or the one nearest to a guess.
 
 One rule orders branches everywhere: those inside the limits first, then the nearest to the guess. A program
-certifies its answer only where rounding cannot change a decision; ``ik.certify`` decides the rest.
+certifies its answer only where rounding cannot change a decision; ``ik.branches`` decides the rest.
 """
 
 from __future__ import annotations
@@ -16,8 +16,10 @@ from screwkin.algebra.se3 import NO_TWIST, ZERO, Pose, Vector
 from screwkin.compiler.program import Program, Recorder
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.ik.closed import EXACT, recognised
+from screwkin.kinematics.arrays import Argument
+from screwkin.kinematics.door import Door
 from screwkin.kinematics.limits import CUT, TURN, beyond, turn_within
-from screwkin.kinematics.rigid import poses
+from screwkin.kinematics.rigid import nearest_pose
 from screwkin.kinematics.serial_chain import SerialChain, cached, miss
 from screwkin.kinematics.status import SINGULAR
 from screwkin.mechanism.limb_motion import seen_screws
@@ -66,7 +68,7 @@ def wrapped_angles(chain: SerialChain, q: Sequence[Scalar]) -> list[Scalar]:
 
 
 @cached
-def limb_branches(chain: SerialChain, position: bool) -> Program:
+def limb_branches(chain: SerialChain, position: bool) -> Door:
     """All solutions of a limb's closed form, in the order of ``ik.solutions.ordered``."""
     form = recognised(chain, position)
     assert form is not None
@@ -77,33 +79,44 @@ def limb_branches(chain: SerialChain, position: bool) -> Program:
         " then the nearest to a guess; NaN where there is none. error: norm of the residual [m and rad];"
         " kind: 2 inside the limits, 1 outside, 0 none; certified: 1 if rounding leaves nothing open.",
     )
-    target = _target_input(recorder, "target", position)
+    arguments = _arguments(chain, "T_base_tip", position)
+    target = _target(recorder, arguments[0])
     near = _sines(_clipped(chain, recorder.input("guess", len(chain.names))))
     rows, certified = [], 1.0
     for *angles, slack in form.formula(target):
         q = wrapped_angles(chain, angles)
-        error = miss(chain, q, target)
+        error = miss(chain, angles, target)
         worst = _worst(chain, q)
         solves = error <= EXACT
         clear = (slack > CLEAR) & solves & (abs_(worst - LIMIT_TOLERANCE) > NEAR_LIMIT)
         certified = where(clear | ((slack < -CLEAR) & ~solves), certified, 0.0)
         kind = where(solves, where(worst <= LIMIT_TOLERANCE, 2.0, 1.0), 0.0)
-        apart = sum(1.0 - cosine for cosine in cosines(q, near))
-        none = kind < 0.5
-        shown = [where(none, math.nan, x) for x in q]
-        rows.append([apart - INSIDE * kind, kind, where(none, math.inf, error), *shown])
+        apart = sum(1.0 - cosine for cosine in cosines(angles, near))
+        rows.append([apart - INSIDE * kind, error, *q])
     rows = _sorted(rows)
+    kinds = [where(key < -1.5 * INSIDE, 2.0, where(key < -0.5 * INSIDE, 1.0, 0.0)) for key, *_ in rows]
     for one, other in pairwise(rows):
-        certified = where((other[0] - one[0] > TIE) | (other[1] < 0.5), certified, 0.0)
-    recorder.output("q", [x for _, _, _, *q in rows for x in q], len(rows), len(chain.names))
-    recorder.output("error", [error for _, _, error, *_ in rows])
-    recorder.output("kind", [kind for _, kind, *_ in rows])
-    recorder.output("certified", [where(rows[0][1] > 0.5, certified, 0.0)])
-    return recorder.program()
+        certified = where((other[0] - one[0] > TIE) | (other[0] > -0.5 * INSIDE), certified, 0.0)
+    absent = [kind < 0.5 for kind in kinds]
+    shown = [where(none, math.nan, x) for none, (_, _, *q) in zip(absent, rows, strict=True) for x in q]
+    recorder.output("q", shown, len(rows), len(chain.names))
+    errors = [where(none, math.inf, error) for none, (_, error, *_) in zip(absent, rows, strict=True)]
+    recorder.output("error", errors)
+    recorder.output("kind", kinds)
+    recorder.output("certified", [where(kinds[0] > 0.5, certified, 0.0)])
+    return Door(recorder, arguments)
 
 
-def _target_input(recorder: Recorder, name: str, position: bool) -> Pose | Vector:
-    return Vector(*recorder.input(name, 3)) if position else pose_input(recorder, name)
+def _arguments(chain: SerialChain, target: str, position: bool) -> list[Argument]:
+    """Target and guess of a limb, as messages call them."""
+    shape = (3,) if position else (4, 4)
+    return [Argument("target", target, shape, not position), Argument("guess", "guess", (len(chain.names),))]
+
+
+def _target(recorder: Recorder, argument: Argument) -> Pose | Vector:
+    """An input that is a position, or a pose, whose rotation is made exact to the last digit."""
+    scalars = recorder.input(argument.name, *argument.shape)
+    return nearest_pose(scalars) if argument.rigid else Vector(*scalars)
 
 
 def _worst(chain: SerialChain, q: Sequence[Scalar]) -> Scalar:
@@ -116,19 +129,32 @@ def _worst(chain: SerialChain, q: Sequence[Scalar]) -> Scalar:
 
 
 def _sorted(rows: Sequence[list[Scalar]]) -> list[list[Scalar]]:
-    """The rows by their first scalar; equal ones keep their order, as neighbours only change places."""
-    rows = list(rows)
-    for last in range(1, len(rows)):
-        for k in range(last, 0, -1):
-            a, b = rows[k - 1], rows[k]
-            swap = b[0] < a[0]
-            rows[k - 1] = [where(swap, y, x) for x, y in zip(a, b, strict=True)]
-            rows[k] = [where(swap, x, y) for x, y in zip(a, b, strict=True)]
+    """The rows by their first scalar, by a merge exchange network; equal ones in any order.
+
+    Source: Batcher (1968); Knuth, The Art of Computer Programming, 5.2.2, algorithm M.
+    """
+    rows, count, p = list(rows), len(rows), 1
+    while p < count:
+        apart = p
+        while apart:
+            for first in range(apart % p, count - apart, 2 * apart):
+                for k in range(first, min(first + apart, count - apart)):
+                    if k // (2 * p) == (k + apart) // (2 * p):
+                        rows[k], rows[k + apart] = _in_order(rows[k], rows[k + apart])
+            apart //= 2
+        p *= 2
     return rows
 
 
+def _in_order(a: list[Scalar], b: list[Scalar]) -> tuple[list[Scalar], list[Scalar]]:
+    """Two rows, that with the smaller first scalar first."""
+    swap = b[0] < a[0]
+    first = [where(swap, y, x) for x, y in zip(a, b, strict=True)]
+    return first, [where(swap, x, y) for x, y in zip(a, b, strict=True)]
+
+
 @cached
-def limb_pose(chain: SerialChain, position: bool) -> Program:
+def limb_pose(chain: SerialChain, position: bool) -> Door:
     """The one solution of a limb that ``solve_pose`` takes, for a target in the world."""
     recorder = Recorder(
         identifier(chain.limb, "pose", "position" if position else "pose"),
@@ -136,18 +162,20 @@ def limb_pose(chain: SerialChain, position: bool) -> Program:
         " within the limits, else nearest to it. error: norm of the residual [m and rad]; inside: 1 if within"
         " the limits; certified: 1 if rounding leaves nothing open and the limb is not singular.",
     )
-    T = pose_input(recorder, "T_world_base")
-    wanted = _target_input(recorder, "target", position)
+    base = Argument("T_world_base", "targets['base']", (4, 4), rigid=True)
+    arguments = [base, *_arguments(chain, "target", position)]
+    T, wanted = (_target(recorder, argument) for argument in arguments[:2])
+    assert isinstance(T, Pose)
     here = T.R.T @ (wanted - T.p) if isinstance(wanted, Vector) else T.inverse @ wanted
     guess = recorder.input("guess", len(chain.names))
-    q, inside, clear, _ = _nearest(chain, here, guess)
-    error = miss(chain, q, here)
-    regular = abs_(limb_determinant(chain, q)) > determinant_bound(chain, SINGULAR)
+    q, angles, inside, clear, _ = _nearest(chain, here, guess)
+    error = miss(chain, angles, here)
+    regular = abs_(limb_determinant(chain, angles)) > determinant_bound(chain, SINGULAR)
     recorder.output("q", q)
     recorder.output("error", [error])
     recorder.output("inside", [where(inside, 1.0, 0.0)])
     recorder.output("certified", [where(clear & (error <= EXACT) & regular, 1.0, 0.0)])
-    return recorder.program()
+    return Door(recorder, arguments)
 
 
 def limb_nearest(robot: Robot, limb: str) -> Program:
@@ -161,7 +189,7 @@ def limb_nearest(robot: Robot, limb: str) -> Program:
         " open.",
     )
     target, guess = pose_input(recorder, "T_base_tip"), recorder.input("guess", len(chain.names))
-    q, _, clear, none = _nearest(chain, target, guess)
+    q, _, _, clear, none = _nearest(chain, target, guess)
     recorder.output("q", [where(none, old, new) for old, new in zip(guess, q, strict=True)])
     recorder.output("error", [miss(chain, q, target)])
     recorder.output("found", [where(none, 0.0, where(clear, 1.0, -1.0))])
@@ -170,8 +198,10 @@ def limb_nearest(robot: Robot, limb: str) -> Program:
 
 def _nearest(
     chain: SerialChain, target: Pose | Vector, guess: Sequence[Scalar]
-) -> tuple[list[Scalar], Scalar, Scalar, Scalar]:
-    """The best branch: its positions; conditions: inside the limits, clear, and no branch at all.
+) -> tuple[list[Scalar], list[Scalar], Scalar, Scalar, Scalar]:
+    """The best branch: its positions; the same less whole turns, whose sines and cosines are known.
+
+    And conditions: inside the limits, clear, and no branch at all.
 
     Nearness is the sum of cosines over the joints, and limits are arcs of the circle: neither needs angles,
     so that only one branch's are computed.
@@ -202,9 +232,10 @@ def _nearest(
         away = scalar.arc(s * b - c * a, c * b + s * a)
         away = where(away <= CUT - math.pi, away + TURN, away)
         q.append(turn_within(start + away, low, high))
+    angles = [scalar.arc(s, c) for s, c in zip(flat[::2], flat[1::2], strict=True)]
     inside = score > 0.5 * INSIDE
     clear = (score > least_key) & (score - second > TIE)
-    return q, inside, clear, (score < least_key) & (second < least_key)
+    return q, angles, inside, clear, (score < least_key) & (second < least_key)
 
 
 def _inside(chain: SerialChain, pairs: Pairs) -> tuple[Scalar, Scalar]:
@@ -248,11 +279,10 @@ def limb_determinant(chain: SerialChain, q: Sequence[Scalar]) -> Scalar:
 def limb_programs(chain: SerialChain) -> list[Program]:
     """The programs of a limb's closed forms: what ``limb_ik`` and ``solve_pose`` run for it."""
     kinds = [position for position in (False, True) if recognised(chain, position)]
-    return [make(chain, position) for position in kinds for make in (limb_branches, limb_pose)]
+    return [make(chain, position).guarded for position in kinds for make in (limb_branches, limb_pose)]
 
 
 def limb_programs_of(robot: Robot) -> list[Program]:
     """The programs worth preparing for inverse kinematics: of every limb that has a closed form."""
     limbs = [] if robot.closures else [SerialChain.of(robot, limb.name) for limb in robot.limbs]
-    programs = [program for chain in limbs for program in limb_programs(chain)]
-    return [*programs, poses(True)] if programs else []
+    return [program for chain in limbs for program in limb_programs(chain)]

@@ -12,9 +12,6 @@ from screwkin.algebra.arrays import Array
 from screwkin.kinematics import limits
 from screwkin.kinematics.serial_chain import SerialChain, residual
 
-EDGE = 0.99
-"""Share of half a range within which free variables begin: on a limit itself they would not move."""
-
 
 @dataclass(frozen=True, eq=False)
 class System:
@@ -95,29 +92,6 @@ class System:
             J[:, rows, columns] = own
         return r, J
 
-    def inner(self, u: Array) -> tuple[Array, Array]:
-        """Positions inside the limits for free variables, x = middle + half the range * sin(u); and dx/du.
-
-        Joints without both limits are their own variables.
-        """
-        middle, half = self._ranges
-        return (
-            np.where(half > 0, middle + half * np.sin(u), u),
-            np.where(half > 0, half * np.cos(u), 1.0),
-        )
-
-    def variables(self, x: Array) -> Array:
-        """The free variables of positions, those beyond their limits taken to them."""
-        middle, half = self._ranges
-        share = np.clip((x - middle) / np.where(half > 0, half, 1.0), -EDGE, EDGE)
-        return np.where(half > 0, np.arcsin(share), x)
-
-    @cached_property
-    def _ranges(self) -> tuple[Array, Array]:
-        both = np.isfinite(self.lower) & np.isfinite(self.upper)
-        low, high = np.where(both, self.lower, 0.0), np.where(both, self.upper, 0.0)
-        return (low + high) / 2, (high - low) / 2
-
     def within(self, x: Array) -> Array:
         """(B,) bool: every joint is inside its limits."""
         return limits.within(x, self.lower, self.upper)
@@ -125,18 +99,3 @@ class System:
     def wrapped(self, x: Array) -> Array:
         """The same positions, angles in (-pi, pi] or one turn off where only that is in the limits."""
         return limits.wrapped(x, self.lower, self.upper, self.turning)
-
-
-@dataclass(frozen=True, eq=False)
-class Bounded(System):
-    """A system whose unknowns are free variables of positions inside the limits (``System.inner``)."""
-
-    def residual(self, x: Array, samples: Array) -> tuple[Array, Array]:
-        """Residual (A, m) of free variables x (A, n), and its Jacobian by them (A, m, n)."""
-        q, slope = self.inner(x)
-        r, J = super().residual(q, samples)
-        return r, J * slope[:, None]
-
-    def wrapped(self, x: Array) -> Array:
-        """The same variables."""
-        return x

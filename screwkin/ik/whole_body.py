@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -10,23 +11,31 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.pattern import components
+from screwkin.compiler.program import kept
 from screwkin.ik.branches import certified_pose, closed_pose
 from screwkin.ik.closed import recognised
 from screwkin.ik.numeric import IkSettings, arrived, solve_system
 from screwkin.ik.pose_solution import PoseSolution
 from screwkin.ik.system import System
 from screwkin.kinematics import limits
-from screwkin.kinematics.arrays import check_rigid as refuse_foreign
-from screwkin.kinematics.rigid import nearest_poses
+from screwkin.kinematics.arrays import checked, exact_target
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.kinematics.status import CLOSED, SINGULAR, Status
 from screwkin.model.robot import Robot
-from screwkin.model.state import RIGID, State
+from screwkin.model.state import State
 
 Method = Literal["auto", "newton"]
 PRECISE = IkSettings(position_tolerance=1e-12, rotation_tolerance=1e-12, max_iterations=80)
 """Settings where none are given: as exact as rounding allows."""
-COUNTED = ("status", "residual", "distance", "angle", "iterations", "worst_joint")
+COUNTED: Mapping[str, type] = {
+    "status": int,
+    "residual": float,
+    "distance": float,
+    "angle": float,
+    "iterations": int,
+    "worst_joint": int,
+}
+"""Arrays of a ``PoseSolution`` (..., limbs), and the kind of their numbers."""
 Limb = tuple[str, SerialChain, Array]
 """A tip, its chain, and its targets in the world: poses (B, 4, 4) or positions (B, 3)."""
 
@@ -34,18 +43,6 @@ Limb = tuple[str, SerialChain, Array]
 def axes_of(target: Any) -> int:
     """Axes of a target behind its batch: a pose (4, 4) has two, a position (3,) one."""
     return 2 if np.shape(target)[-2:] == (4, 4) else 1
-
-
-def exact(name: str, target: Array) -> Array:
-    """A target, its rotation made exact to the last digit if it is a pose.
-
-    Raises:
-        ShapeError: a matrix is not rigid.
-    """
-    if axes_of(target) == 1:
-        return target
-    deviation, poses = nearest_poses(target)
-    return refuse_foreign(name, target) if deviation.size and deviation.max() > RIGID else poses
 
 
 def solve_whole_body(
@@ -56,30 +53,39 @@ def solve_whole_body(
     method: Method,
     settings: IkSettings,
 ) -> PoseSolution:
-    """As ``solve_pose``, for exact NumPy arrays that broadcast to a batch; a target for the base is given."""
-    count, size = int(np.prod(batch)), len(robot.joints)
-    q = np.broadcast_to(guess, (*batch, size)).reshape(count, size).astype(float)
+    """As ``solve_pose``, for NumPy arrays that broadcast to a batch; a target for the base is given.
+
+    Raises:
+        ShapeError: NaN or infinity, or a pose that is not rigid.
+    """
+    count, size = math.prod(batch), len(robot.joints)
+    q = np.array(np.broadcast_to(guess, (*batch, size))).reshape(count, size)
     flat = {}
     for name, target in targets.items():
         shape = target.shape[target.ndim - axes_of(target) :]
         flat[name] = np.broadcast_to(target, (*batch, *shape)).reshape(count, *shape)
     base = flat.pop("base")
     limbs = [(name, SerialChain.of(robot, name), target) for name, target in flat.items()]
-    parts = {name: np.zeros((count, len(limbs))) for name in COUNTED}
-    shared = np.zeros((len(limbs), size), dtype=np.int64)
-    for row, (_, chain, _) in enumerate(limbs):
-        shared[row, list(chain.joints)] = 1
-    for block, _ in components(shared):
-        chain, target = limbs[block[0]][1:]
-        alone = len(block) == 1 and method == "auto" and recognised(chain, target.ndim == 2)
+    parts: dict[str, Array] = {
+        name: np.zeros((count, len(limbs)), dtype=kind) for name, kind in COUNTED.items()
+    }
+    for rows in _apart(robot, tuple(flat)):
+        chain, target = limbs[rows[0]][1:]
+        alone = len(rows) == 1 and method == "auto" and recognised(chain, target.ndim == 2)
         solve = _by_closed_form if alone else _by_newton
-        solve(_Work(base, q, parts, settings), [limbs[row] for row in block], block)
+        solve(_Work(base, q, parts, settings), [limbs[row] for row in rows], rows)
     counts = [parts[name].reshape(*batch, len(limbs)) for name in COUNTED]
-    for k, name in enumerate(COUNTED):
-        if name in ("status", "iterations", "worst_joint"):
-            counts[k] = counts[k].astype(int)
     state = State(base.reshape(*batch, 4, 4), q.reshape(*batch, size))
     return PoseSolution(state, tuple(chain.limb for _, chain, _ in limbs), *counts)
+
+
+@kept
+def _apart(robot: Robot, tips: tuple[str, ...]) -> list[list[int]]:
+    """Which tips are solved together, as their limbs share joints."""
+    shared = np.zeros((len(tips), len(robot.joints)), dtype=np.int64)
+    for row, tip in enumerate(tips):
+        shared[row, list(SerialChain.of(robot, tip).joints)] = 1
+    return [rows for rows, _ in components(shared)]
 
 
 def in_base(T: Array, target: Array) -> Array:
@@ -108,27 +114,31 @@ def _by_closed_form(work: _Work, limbs: Sequence[Limb], rows: Sequence[int]) -> 
     base, q, parts, settings = work.base, work.q, work.parts, work.settings
     ((_, chain, target),), (row,) = limbs, rows
     joints, tolerances = list(chain.joints), settings.tolerances
-    guess = q[:, joints]
-    own, error, inside, certified = closed_pose(chain, base, target, guess, tolerances)
-    q[:, joints] = own
-    parts["status"][:, row] = np.where(inside, Status.CONVERGED, Status.OUT_OF_LIMITS)
+    guess = q.take(joints, axis=1)
+    own, error, inside, undecided = closed_pose(chain, base, target, guess, tolerances)
     parts["residual"][:, row] = parts["distance"][:, row] = error
     parts["iterations"][:, row] = 1
-    again = np.flatnonzero(~certified)
+    parts["status"][~inside, row] = Status.OUT_OF_LIMITS
+    again = undecided.nonzero()[0]
     if len(again):
-        system = System([chain], [in_base(base[again], target[again])])
+        system = System(
+            [chain], [in_base(*map(exact_target, ("base", "target"), (base[again], target[again])))]
+        )
         own[again] = certified_pose(chain, system.targets[0], guess[again], tolerances)
-        q[again[:, None], joints] = own[again]
         _judge(work, system, own[again], rows, again)
-    beyond = np.flatnonzero(parts["status"][:, row] == Status.OUT_OF_LIMITS)
-    worst = limits.worst_joint(own[beyond], chain.lower, chain.upper)
-    parts["worst_joint"][beyond, row] = np.array(joints)[worst]
+    q[:, joints] = own
+    beyond = (parts["status"][:, row] == Status.OUT_OF_LIMITS).nonzero()[0]
+    if len(beyond):
+        worst = limits.worst_joint(own[beyond], chain.lower, chain.upper)
+        parts["worst_joint"][beyond, row] = np.array(joints)[worst]
 
 
 def _by_newton(work: _Work, limbs: Sequence[Limb], rows: Sequence[int]) -> None:
     """Limbs that share joints, together."""
     base, q, parts, settings = work.base, work.q, work.parts, work.settings
-    system = System([chain for _, chain, _ in limbs], [in_base(base, target) for *_, target in limbs])
+    base = exact_target("base", checked("base", base))
+    targets = [in_base(base, exact_target(tip, checked(tip, target))) for tip, _, target in limbs]
+    system = System([chain for _, chain, _ in limbs], targets)
     joints = list(system.joints)
     guess = q[:, joints]
     x, iterations = solve_system(system, "newton", guess, settings)

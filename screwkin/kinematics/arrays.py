@@ -12,7 +12,8 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.scalar import is_jax
 from screwkin.compiler.run import as_rows, common_batch
 from screwkin.errors import ShapeError
-from screwkin.kinematics.rigid import foreign
+from screwkin.kinematics.rigid import foreign, nearest_poses
+from screwkin.model.state import RIGID
 
 SHORT = ("float16", "bfloat16", "float32")
 """Floats with too few digits for positions: refused, not converted silently."""
@@ -122,6 +123,18 @@ def check_rigid(name: str, T: Array) -> Array:
             "right-handed 3 x 3 rotation and the last row 0 0 0 1"
         )
     return T
+
+
+def exact_target(name: str, target: Array) -> Array:
+    """A checked target (..., 4, 4) or (..., 3), its rotation made exact to the last digit if it is a pose.
+
+    Raises:
+        ShapeError: a matrix is no rigid displacement.
+    """
+    if target.shape[-2:] != (4, 4):
+        return target
+    deviation, poses = nearest_poses(target)
+    return check_rigid(name, target) if deviation.size and deviation.max() > RIGID else poses
 
 
 def one_batch(arrays: Mapping[str, tuple[Array, int]]) -> tuple[int, ...]:

@@ -39,11 +39,16 @@ def poses(exact: bool) -> Program:
     """
     recorder = Recorder("exact_poses" if exact else "poses", "How far a matrix is from a pose.")
     T = recorder.input("T", 4, 4)
-    R = Rotation(*(Vector(*T[c:12:4]) for c in range(3)))
     recorder.output("deviation", [deviation(T)])
     if exact:
-        recorder.output("pose", matrix(Pose(_nearer(_nearer(R)), Vector(*T[3:12:4]))), 4, 4)
+        recorder.output("pose", matrix(nearest_pose(T)), 4, 4)
     return recorder.program()
+
+
+def nearest_pose(T: Sequence[Scalar]) -> Pose:
+    """The pose nearest to sixteen scalars, row by row, that are one to rounding or a little more."""
+    R = Rotation(*(Vector(*T[c:12:4]) for c in range(3)))
+    return Pose(_nearer(_nearer(R)), Vector(*T[3:12:4]))
 
 
 def deviation(T: Sequence[Scalar]) -> Scalar:

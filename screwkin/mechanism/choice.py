@@ -15,9 +15,11 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import UNTURNED, norm, rotation_log
+from screwkin.compiler.program import kept
 from screwkin.errors import InputError, SingularError, expect, one_of
 from screwkin.kinematics.positions import link_displacements
-from screwkin.mechanism.mechanism import Mechanism, unchosen
+from screwkin.mechanism.graph import CouplingGraph
+from screwkin.mechanism.mechanism import Mechanism, VirtualChain, unchosen
 from screwkin.mechanism.network import coupling_twists, network_of_twists
 from screwkin.mechanism.scaling import characteristic_length, referenced
 from screwkin.model.robot import Robot
@@ -105,6 +107,16 @@ def closed_mechanism(robot: Robot, primary: Sequence[str] | None = None) -> Mech
     Source: Davies (1981); paper A, eq. 9-11, 15.
     """
     expect(robot, Robot, "robot", 'load_robot("NAME")')
+    named = primary if primary is None or isinstance(primary, str) else tuple(primary)
+    return Mechanism(robot, *_checked(robot, named))
+
+
+Parts = tuple[tuple[VirtualChain, ...], CouplingGraph, tuple[str, ...], tuple[str, ...], int]
+
+
+@kept
+def _checked(robot: Robot, primary: Sequence[str] | None) -> Parts:
+    """The parts of ``closed_mechanism`` besides the robot."""
     bare, q = unchosen(robot), reference_posture(robot)
     _check_closed(robot, q)
     N = referenced(bare, network_of_twists(bare, coupling_twists(bare, UNTURNED, q)))
@@ -120,7 +132,7 @@ def closed_mechanism(robot: Robot, primary: Sequence[str] | None = None) -> Mech
         mobility=mobility,
     )
     _check(chosen, N)
-    return chosen
+    return bare.chains, bare.graph, chosen.primary, chosen.secondary, mobility
 
 
 def _wanted(bare: Mechanism, primary: Sequence[str]) -> set[str]:

@@ -6,6 +6,7 @@ Pure integer work. Source: Davies (1981), after Kirchhoff; paper A, section 2.4 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -57,6 +58,7 @@ def cut_set_matrix(graph: CouplingGraph) -> Integers:
     return np.rint(Q).astype(np.int64)
 
 
+@lru_cache(maxsize=32)
 def circuit_matrix(graph: CouplingGraph) -> Integers:
     """Fundamental circuits (chords, edges), each so that its first edge counts +1."""
     tree = list(spanning_tree(graph))
@@ -68,4 +70,5 @@ def circuit_matrix(graph: CouplingGraph) -> Integers:
         B[np.arange(len(chords)), chords] = 1
     for row in B:
         row *= row[np.flatnonzero(row)[0]]
+    B.flags.writeable = False
     return B

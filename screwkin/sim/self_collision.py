@@ -81,7 +81,7 @@ def collisions_of_run(robot: Robot, trajectory: Trajectory, run: Run) -> tuple[S
     Raises:
         MissingDependencyError: mujoco is not installed.
     """
-    stood = run.time < (np.inf if run.fallen_at is None else run.fallen_at)
+    stood = (run.time < (np.inf if run.fallen_at is None else run.fallen_at)) & np.isfinite(run.q).all(axis=1)
     every = max(1, round(_SAMPLED / run.dt))
     time = np.concatenate([trajectory.time, run.time[stood][::every]])
     return self_collisions(robot, time, np.concatenate([trajectory.q, run.q[stood][::every]]))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -108,3 +110,15 @@ def test_what_cannot_be_held_is_refused() -> None:
         with_held_joints(
             sk.load_robot("linkages/four-bar"), {sk.load_robot("linkages/four-bar").joint_names[0]: 0.0}
         )
+
+
+def test_what_is_driven_lasts_as_the_robot_does() -> None:
+    """Else the programs of the moving joints would be recorded anew for every walk."""
+    robot = with_arm_yaw(sk.load_robot("bioloid"))
+    moving = driven(robot).moving
+    assert moving is not robot
+    assert driven(robot).moving is moving
+    gone = weakref.ref(robot)
+    del robot
+    gc.collect()
+    assert gone() is None

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
 
 import screwkin as sk
+from screwkin.compiler.program import Recorder
 from screwkin.compiler.run import run
 from screwkin.errors import ShapeError
 from screwkin.ik import programs as limbs
@@ -165,3 +167,13 @@ def test_unreachable_singular_and_forbidden_samples_have_the_same_status_in_a_la
         Status.UNREACHABLE,
     ]
     np.testing.assert_allclose(large.distance[7, 0], small.distance[7, 0], rtol=1e-6)
+
+
+@pytest.mark.parametrize("count", range(1, 9))
+def test_branches_are_sorted_whatever_their_order(count):
+    """A network that sorts all sequences of 0 and 1 sorts all sequences."""
+    recorder = Recorder("sorted", "")
+    rows = [[x] for x in recorder.input("x", count)]
+    recorder.output("y", [x for (x,) in limbs._sorted(rows)])
+    x = np.array(list(product((0.0, 1.0), repeat=count)))
+    assert (run(recorder.program(), {"x": x})["y"] == np.sort(x, axis=1)).all()

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,6 +22,7 @@ from tests.laws.limbs import at, inside, random_robot, slid, targets_at
 
 BUNDLED = ("bioloid", "bioloid24", "poppy12")
 BASE = np.eye(4)
+ROOT = Path(__file__).parents[2]
 
 
 def fresh(name: str) -> sk.Robot:
@@ -28,8 +33,8 @@ def solved(robot: sk.Robot, targets: dict[str, np.ndarray], method: str = "auto"
     return sk.solve_pose(robot, targets, sk.State(BASE, sk.home(robot).q), method)  # type: ignore[arg-type]
 
 
-def assert_one_answer(robot: sk.Robot, q: np.ndarray, sizes: tuple[int, ...]) -> None:
-    """Statuses are equal and positions equal to rounding alone and in batches of any size."""
+def assert_one_answer(robot: sk.Robot, q: np.ndarray, sizes: tuple[int, ...]) -> PoseSolution:
+    """The answer of the whole batch, which is that of every sample alone and in batches of any size."""
     targets = targets_at(robot, q)
     whole = solved(robot, targets)
     for size in sizes:
@@ -38,6 +43,7 @@ def assert_one_answer(robot: sk.Robot, q: np.ndarray, sizes: tuple[int, ...]) ->
             some = solved(robot, at(targets, part))
             np.testing.assert_array_equal(some.status, whole.status[part])
             np.testing.assert_allclose(some.state.q, whole.state.q[part], atol=1e-11)
+    return whole
 
 
 @pytest.mark.parametrize("name", BUNDLED)
@@ -80,6 +86,29 @@ def test_reachable_poses_converge_from_home_inside_the_limits(name: str, spread:
             best = sk.limb_ik(robot, limb.name, targets[limb.tip], guess=home_of(robot, limb.name)).best
             joints = list(SerialChain.of(robot, limb.name).joints)
             np.testing.assert_allclose(solution.state.q[:, joints], best, atol=1e-7)
+
+
+@pytest.mark.parametrize("seed", [2, 4])
+def test_reachable_poses_of_random_robots_converge_from_home_inside_the_limits(seed: int) -> None:
+    robot = random_robot(seed)
+    solution = solved(robot, targets_at(robot, inside(robot, 100, seed)))
+    assert (solution.status == Status.CONVERGED).mean(axis=0).min() > 0.97
+
+
+def test_a_position_beyond_a_redundant_limb_s_reach_is_unreachable() -> None:
+    robot = random_robot(3)
+    chain = SerialChain.of(robot, "right_arm")
+    assert len(chain.joints) == 4
+    far = np.array([1.01 * sum(chain.levers), 0.0, 0.0]) + np.array(list(chain.screws[0].s0))
+    assert sk.limb_ik(robot, "right_arm", far).status == Status.UNREACHABLE
+    assert solved(robot, {"right_hand": far}).status == Status.UNREACHABLE
+
+
+def test_a_pose_that_five_joints_cannot_take_is_unreachable() -> None:
+    robot = random_robot(4)
+    T = sk.frame_pose(robot, sk.State(BASE, inside(robot, 20, 1)), "left_hand")
+    T[:, :3, :3] = T[::-1, :3, :3]
+    assert (sk.limb_ik(robot, "left_arm", T).status == Status.UNREACHABLE).all()
 
 
 def home_of(robot: sk.Robot, limb: str) -> np.ndarray:
@@ -173,11 +202,10 @@ def test_a_joint_that_no_target_needs_rests_at_the_guess() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("spread", [None, 1.0])
 @pytest.mark.parametrize("name", BUNDLED)
-def test_a_thousand_poses_of_bundled_robots(name: str, spread: float | None) -> None:
+def test_thousands_of_poses_of_bundled_robots(name: str, spread: float | None) -> None:
     robot = fresh(name)
     q = inside(robot, 5000, 1, spread)
-    assert (solved(robot, targets_at(robot, q)).status == Status.CONVERGED).mean() > 0.99
-    assert_one_answer(robot, q, (1, 7, 999, 1000))
+    assert (assert_one_answer(robot, q, (1, 7, 999, 1000)).status == Status.CONVERGED).mean() > 0.99
     for _ in range(20):
         solved(robot, at(targets_at(robot, q), slice(0, 3)))
     assert_one_answer(robot, q[:1000], (1, 7))
@@ -186,5 +214,35 @@ def test_a_thousand_poses_of_bundled_robots(name: str, spread: float | None) -> 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_a_thousand_poses_of_random_robots(seed: int) -> None:
+    """Limbs of 3 to 8 joints, poses and positions, alone or sharing a joint; the calls are a history, too."""
     robot = random_robot(seed)
-    assert_one_answer(robot, inside(robot, 1000, seed), (7, 999))
+    whole = assert_one_answer(robot, inside(robot, 1000, seed), (1, 7, 999))
+    assert (whole.status == Status.CONVERGED).mean(axis=0).min() > 0.97
+
+
+POSES = """
+import sys
+from tests.laws.limbs import inside, random_robot, targets_at
+from tests.laws.test_one_pose import BUNDLED, fresh, solved
+answers = []
+for robot in [*map(fresh, BUNDLED), *map(random_robot, range(5))]:
+    solution = solved(robot, targets_at(robot, inside(robot, 60, 1)))
+    answers += [solution.status.tobytes(), solution.state.q.tobytes()]
+sys.stdout.buffer.write(b"".join(answers))
+"""
+
+
+@pytest.mark.slow
+def test_poses_are_the_same_bytes_in_every_process_with_a_cold_and_a_warm_cache(tmp_path: Path) -> None:
+    first, *others = (
+        subprocess.run(
+            [sys.executable, "-c", POSES],
+            env={**os.environ, "SCREWKIN_CACHE": str(tmp_path / folder), "PYTHONPATH": str(ROOT)},
+            cwd=ROOT,
+            capture_output=True,
+            check=True,
+        ).stdout
+        for folder in ("one", "one", "two")
+    )
+    assert len(first) > 60 * 8 * (18 + 18 + 12)
+    assert others == [first, first]
