@@ -283,3 +283,14 @@ def test_a_walk_without_sway_falls_and_the_reasons_are_told(cli):
     assert called.code == 3
     assert "NOT passed:" in called.out
     assert "planned ZMP leaves the support polygon" in called.out
+
+
+def test_a_checked_solver_says_what_its_finer_settings_change(cli, walked, tmp_path):
+    (tmp_path / "t.npz").write_bytes((walked / "trajectory.npz").read_bytes())
+    called = cli("validate", "t.npz", "--engine", "mujoco", "--check-solver", "--no-plots", "--json")
+    assert called.code == 0, called.out + called.err
+    assert (called.data["engine"], called.data["undecided"]) == ("mujoco", False)
+    settings = called.data["solver"]["mujoco"]
+    assert settings["passed"] == {"usual": True, "half the step": True, "twice the iterations": True}
+    low, high = settings["spread"]["zmp_rms_mm"]
+    assert high - low < 1.0

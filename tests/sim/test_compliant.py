@@ -14,6 +14,7 @@ from screwkin.errors import InputError
 from screwkin.model.robot import Robot
 from screwkin.sim.backend import Command, Observation
 from screwkin.sim.compliant import STEP, Compliance, SpringServos
+from screwkin.sim.mujoco import MuJoCoBackend, MuJoCoPhysics
 from screwkin.sim.pybullet import Physics, PyBulletBackend
 
 pytest.importorskip("pybullet")
@@ -76,6 +77,23 @@ def test_standing_on_one_foot_it_yields_as_the_equilibrium_says(robot: Robot, op
     feet = [limb.tip for limb in robot.limbs if limb.kind == "leg"]
     assert feet[0] == "left_foot"
     assert sunk == pytest.approx(expected.of("left_foot")[5], abs=3e-4)
+
+
+def test_in_mujoco_it_yields_as_the_equilibrium_says_too(robot: Robot) -> None:
+    """There the rotors turn with their joints alone; rest is the same."""
+    pytest.importorskip("mujoco")
+    state = one_legged(robot)
+    expected = static_deflection(robot, state, "right_foot", 60.0)
+    servos = SpringServos(robot, Compliance(60.0, damping=3.0, rotor_inertia=5e-3))
+    backend = MuJoCoBackend(robot, MuJoCoPhysics(dt=STEP), servos=servos)
+    backend.reset(state)
+    hold = Command(state.q, np.zeros_like(state.q), state.T_world_base)
+    for _ in range(1500):
+        backend.step(hold)
+    seen = backend.observe()
+    assert np.abs(seen.qd).max() < 1e-4
+    np.testing.assert_allclose(seen.q - state.q, expected.theta, rtol=0, atol=2e-5)
+    np.testing.assert_allclose(seen.torque, expected.torque, rtol=0, atol=1e-3)
 
 
 def test_commands_lead_a_moving_joint_by_its_damper(robot: Robot, opened: Open) -> None:
