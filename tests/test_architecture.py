@@ -24,7 +24,7 @@ FLOORS: dict[str, int] = {
     "errors": 0, "files": 0, "cache": 0, "algebra": 0,
     "compiler": 1,
     "model": 2,
-    "kinematics": 3,
+    "kinematics": 3, "motors": 3,
     "dynamics": 4, "mechanism": 4,
     "ik": 5, "compliance": 5,
     "gait": 6, "trajectory": 6,

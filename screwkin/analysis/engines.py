@@ -8,16 +8,22 @@ from typing import Literal, TypeVar
 
 from screwkin.compliance.springs import joint_stiffness
 from screwkin.errors import InputError, UnknownNameError
-from screwkin.gait.compensation import stiffness_of
+from screwkin.gait.compensation import WAYS, compensate, stiffness_of, way_of
 from screwkin.model.robot import Robot
+from screwkin.motors.library import motors_named, motors_of
+from screwkin.motors.records import Motor
 from screwkin.sim.backend import Backend
 from screwkin.sim.compliant import STEP, Compliance, SpringServos
+from screwkin.sim.drive import Servos
 from screwkin.sim.kinematic import KinematicBackend
+from screwkin.sim.motors import MotorServos
 from screwkin.sim.mujoco import MuJoCoBackend, MuJoCoPhysics
 from screwkin.sim.pybullet import Physics, PyBulletBackend
 from screwkin.trajectory import Trajectory
 
 Engine = Literal["auto", "pybullet", "mujoco", "kinematic"]
+TABLE = "table"
+"""The servos that a robot's table names."""
 ENGINES: tuple[Engine, ...] = ("auto", "pybullet", "mujoco", "kinematic")
 PROVING = ("mujoco", "pybullet")
 """Engines whose contact forces confirm a walk; ``+`` joins the names of those that agreed."""
@@ -28,32 +34,59 @@ class SimulatedCompliance:
     """Compliance of servos and soles in a simulation; none by default.
 
     servos: springs for servos, None for rigid ones; a stiffness of None is the one that the trajectory is
-    compensated for, else the table's. sole_stiffness: of every point of contact [N/m], None for rigid soles.
+    compensated for, else the table's. motors: real servos instead, ``table`` for the models that the table
+    names, else the name or the file of a model for all joints. sole_stiffness: of every point of contact
+    [N/m], None for rigid soles.
     repeat: play the trajectory under other frictions and time steps too, as contact is chaotic on springs.
     """
 
     servos: Compliance | None = None
     sole_stiffness: float | None = None
     repeat: bool = False
+    motors: str | None = None
 
     def __post_init__(self) -> None:
         if self.repeat and self.servos is None:
             raise InputError(
                 "only walks on elastic servos are repeated under other conditions; give them springs"
             )
+        if self.motors is not None and self.servos is not None:
+            raise InputError(f"servos are springs or motors ({self.motors}), not both; choose one")
 
     def for_trajectory(self, robot: Robot, trajectory: Trajectory) -> SimulatedCompliance:
         """The same with the stiffness of every joint by its name.
 
         Raises:
-            InputError, UnknownNameError: a joint's stiffness is missing, or no positive number.
+            InputError, UnknownNameError: a joint's stiffness is missing, or no positive number; or a motor's
+                figures are not known.
         """
+        self.motors_of(robot)
         if self.servos is None:
             return self
         chosen = self.servos.stiffness
         k = joint_stiffness(robot, stiffness_of(trajectory) if chosen is None else chosen).tolist()
         by_name = dict(zip(robot.joint_names, k, strict=True))
         return replace(self, servos=replace(self.servos, stiffness=by_name))
+
+    def motors_of(self, robot: Robot) -> tuple[Motor, ...]:
+        """The motor of every joint, none if servos are rigid or springs."""
+        if self.motors is None:
+            return ()
+        return motors_of(robot) if self.motors == TABLE else motors_named(robot, self.motors)
+
+    def commands(self, robot: Robot, trajectory: Trajectory) -> Trajectory:
+        """What the servos are sent: on motors, a plan with the torque term, so that they follow it.
+
+        A trajectory that is compensated stays as it is, as does one that is no walk on two feet.
+        """
+        motors = self.motors_of(robot)
+        if not motors or way_of(trajectory) != "none" or len(trajectory.feet) != 2:
+            return trajectory
+        stiffness = {
+            name: float(motor.stiffness) for name, motor in zip(robot.joint_names, motors, strict=True)
+        }
+        method, model = WAYS["dynamic"]
+        return compensate(robot, trajectory, stiffness, method, model=model)
 
 
 def confirms(engine: str) -> bool:
@@ -111,15 +144,17 @@ def opened(
         InputError: it has no contact forces, or no elastic soles.
         MissingDependencyError: it is not installed.
     """
-    soles, springs = compliance.sole_stiffness, compliance.servos
+    soles, springs, motors = compliance.sole_stiffness, compliance.servos, compliance.motors_of(robot)
     if engine == "kinematic":
-        if springs is not None or soles is not None:
+        if springs is not None or soles is not None or motors:
             raise InputError(
                 "engine kinematic has no contact forces and cannot simulate compliance; use pybullet"
             )
         return KinematicBackend(robot)
     dt = STEP if springs is not None else None
-    servos = None if springs is None else SpringServos(robot, springs, STEP)
+    servos: Servos | None = None if springs is None else SpringServos(robot, springs, STEP)
+    if motors:
+        servos = MotorServos(motors, MuJoCoPhysics().dt, str(compliance.motors))
     if engine == "pybullet":
         physics = _refined(Physics(sole_stiffness=soles), dt, finer)
         return PyBulletBackend(robot, physics, gui, servos)

@@ -16,7 +16,7 @@ from screwkin.analysis.verdict import Criteria, Measured, fallen_again, reasons_
 from screwkin.errors import InputError
 from screwkin.files import text_sha256
 from screwkin.gait.balance import zmp as balance_of
-from screwkin.gait.compensation import way_of
+from screwkin.gait.compensation import stiffness_of, way_of
 from screwkin.gait.intended import intended
 from screwkin.model.robot import Robot, robot_text
 from screwkin.sim.camera import Camera, Picture
@@ -35,6 +35,12 @@ _FINER = {
     "half the step": Refinement(step=2),
     "twice the iterations": Refinement(iterations=2),
 }
+
+
+_NOT_THE_FILE = (
+    "the servos were sent the plan with the torque term, which the file does not hold, so send refuses it; "
+    "to send, write the commands with walk --compensate dynamic and validate those"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +99,7 @@ def validate(
     _check_fit(robot, trajectory)
     rule, report = criteria or Criteria(), progress or (lambda share: None)
     compliance = (compliance or SimulatedCompliance()).for_trajectory(robot, trajectory)
+    commands = motion or compliance.commands(robot, trajectory)
     names = engines_for(engine, robot, compliance)
     ways = _FINER if check_solver and names != ("kinematic",) else {"usual": Refinement()}
     first = (0.2 if compliance.repeat else 1.0) / (len(names) * len(ways))
@@ -104,7 +111,7 @@ def validate(
         try:
             run = simulate(
                 robot,
-                motion or trajectory,
+                commands,
                 backend,
                 rule.schedule,
                 lambda share: report(first * (done + share)),
@@ -112,7 +119,15 @@ def validate(
         finally:
             backend.close()
         done += 1
-        return judged(robot, trajectory, run, rule, compliance)
+        check = judged(robot, trajectory, run, rule, compliance)
+        if commands is trajectory or motion is not None:
+            return check
+        return replace(
+            check,
+            compensation=way_of(commands),
+            joint_stiffness=_stiffness(commands),
+            warnings=(*check.warnings, _NOT_THE_FILE),
+        )
 
     checks = []
     for name in names:
@@ -130,6 +145,12 @@ def validate(
         report(first + (1.0 - first) * share)
 
     return _repeated(check, repeated(robot, trajectory, compliance.servos.stiffness, conditions, later))
+
+
+def _stiffness(commands: Trajectory) -> dict[str, float] | None:
+    """What the commands of motors allow for [N m/rad]."""
+    allowed = stiffness_of(commands)
+    return {**allowed} if isinstance(allowed, Mapping) else None
 
 
 def _repeated(check: Validation, trials: Sequence[Trial]) -> Validation:

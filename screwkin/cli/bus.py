@@ -5,6 +5,7 @@ from __future__ import annotations
 import typer
 
 from screwkin.cli import APP
+from screwkin.cli.bus_identify import bus_identify
 from screwkin.cli.bus_talk import bus_calibrate, bus_read, bus_scan
 from screwkin.cli.bus_virtual import virtual
 
@@ -19,4 +20,5 @@ def group() -> None:
 bus.command("scan")(bus_scan)
 bus.command("read")(bus_read)
 bus.command("calibrate")(bus_calibrate)
+bus.command("identify")(bus_identify)
 bus.command("virtual")(virtual)

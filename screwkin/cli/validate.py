@@ -24,6 +24,9 @@ from screwkin.report.numbers import validation_numbers
 from screwkin.sim.compliant import Compliance
 from screwkin.trajectory import load_trajectory
 
+RIGID = "rigid"
+"""Servos that follow their commands exactly."""
+
 
 def validate(
     trajectory: TrajectoryPath,
@@ -35,6 +38,12 @@ def validate(
     ] = "auto",
     gui: Annotated[bool, typer.Option("--gui", help="Show a window, at the robot's own speed.")] = False,
     video: Annotated[bool, typer.Option("--video", help="Film it: walk.gif.")] = False,
+    servo: Annotated[
+        str,
+        typer.Option(
+            help="rigid; table: motors of the models that the table names; or a servo model, or its file."
+        ),
+    ] = RIGID,
     compliant: Annotated[
         bool, typer.Option("--compliant", help="Springs for servos, commanded at the trajectory's rate.")
     ] = False,
@@ -72,11 +81,11 @@ def validate(
     does not pass; the reasons are listed.
     """
     engine_named(engine)
-    compliance = _compliance(compliant, k, sole_stiffness, repeat)
+    compliance = _compliance(compliant, k, sole_stiffness, repeat, servo)
     if log is not None:
         if compliance != SimulatedCompliance():
             raise InputError(
-                "--log replays servos that moved; it goes without --compliant and --sole-stiffness"
+                "--log replays servos that moved; it goes without --servo, --compliant and --sole-stiffness"
             )
         return replay(trajectory, log, Wish(engine, check_solver, gui, video, plots), output, as_json)
     loaded = load_trajectory(trajectory)
@@ -117,17 +126,19 @@ def _beside(trajectory: Path) -> Path:
 
 
 def _compliance(
-    compliant: bool, k: float | None, sole_stiffness: float | None, repeat: bool
+    compliant: bool, k: float | None, sole_stiffness: float | None, repeat: bool, servo: str
 ) -> SimulatedCompliance:
     """The compliance that a command line asks for."""
     if not compliant and (repeat or k is not None):
         raise InputError(f"{'--repeat' if repeat else '--stiffness'} is of elastic servos; add --compliant")
-    return SimulatedCompliance(Compliance(k) if compliant else None, sole_stiffness, repeat)
+    springs, motors = Compliance(k) if compliant else None, None if servo == RIGID else servo
+    return SimulatedCompliance(springs, sole_stiffness, repeat, motors)
 
 
 def _changes(engine: str, compliance: SimulatedCompliance, k: float | None) -> list[str]:
     """The options that ask for another simulation than the usual one."""
     words = ["--engine", engine] if engine != "auto" else []
+    words += ["--servo", compliance.motors] if compliance.motors is not None else []
     words += ["--compliant"] if compliance.servos is not None else []
     words += [] if k is None else ["--stiffness", f"{k:g}"]
     words += (

@@ -10,6 +10,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.model.robot import Robot
+from screwkin.motors.library import motor_models, motors_of, names_motors
 
 StiffnessChoice = float | Mapping[str, float] | None
 
@@ -20,17 +21,20 @@ def joint_stiffness(robot: Robot, stiffness: StiffnessChoice = None) -> Array:
     Args:
         robot: n joints.
         stiffness: one number for all; or a number by joint name, ``default`` for those not named; or None for
-            ``stiffness`` of the table's ``[servos]``, which may be either.
+            ``stiffness`` of the table's ``[servos]``, which may be either; where the table gives none, that
+            of its servo models in the steady state.
 
     Raises:
         InputError: there is none, a joint has none, or one is not a positive finite number.
         UnknownNameError: no such joint.
     """
     chosen: Any = robot.servos.get("stiffness") if stiffness is None else stiffness
+    if chosen is None and names_motors(robot):
+        return np.array([motor.stiffness for motor in motors_of(robot)], dtype=float)
     if chosen is None:
         raise InputError(
             f"{robot.name} has no joint stiffness; give one in N m/rad, or write stiffness under [servos] "
-            "of its table"
+            f"of its table, or a model of servo that is known: {', '.join(motor_models())}"
         )
     by_name = chosen if isinstance(chosen, Mapping) else {"default": chosen}
     for name in by_name:

@@ -13,10 +13,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from importlib.resources import files
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
 from screwkin.errors import InputError, UnknownNameError
+from screwkin.motors.library import load_motor, motor_models
 
 Unit = Literal["", "tick", "speed", "load", "pwm", "0.1V", "degC", "2us", "ms"]
 Sign = Literal["none", "bit-10", "twos"]
@@ -120,17 +122,27 @@ def profile_models() -> tuple[str, ...]:
     return tuple(profile.model for profile in _profiles())
 
 
-def load_profile(model: str) -> Profile:
+def load_profile(model: str, folder: Path | None = None) -> Profile:
     """The profile of a servo model; case and the maker's aliases do not matter.
 
+    The path of a user's own file stands for the model whose ``registers`` it names; see ``motors.library``.
+
+    Args:
+        model: a name, or a path that ends in ``.toml``.
+        folder: where relative paths begin, besides the working folder.
+
     Raises:
-        UnknownNameError: there is no such model; the message lists those there are.
+        UnknownNameError: there is no such model, or only its motor is known; it lists those there are.
+        TableError: the faults of the user's file.
     """
-    wanted = model.strip().lower()
+    file = model.strip().lower().endswith(".toml")
+    wanted = (load_motor(model, folder).registers if file else model.strip()).lower()
     for profile in _profiles():
         if wanted in {name.lower() for name in (profile.model, *profile.aliases)}:
             return profile
-    raise UnknownNameError("servo model", model, profile_models())
+    simulated = file or wanted in map(str.lower, motor_models())
+    what = "register table of servo model (its motor can only be simulated)" if simulated else "servo model"
+    raise UnknownNameError(what, model, profile_models())
 
 
 def ticks_from_radians(profile: Profile, angle: float) -> int:

@@ -8,6 +8,7 @@
     direction = { knee = -1 }   # -1 where the joint's positive sense is that of falling ticks; default 1
     zero = { hip = 0.012 }      # angle of the servo from its centre, with the joint at 0 [rad]; default 0
     range_deg = 300.0           # of all servos: overrides the model's, where a tick was measured
+    gain = 32                   # of the firmware; voltage, lag: of all motors in simulations (see ``motors``)
 
 servo angle = direction * joint angle + zero.
 """
@@ -19,11 +20,13 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 from screwkin.errors import Fault, InputError, TableError, UnknownNameError
 from screwkin.files import text_sha256
 from screwkin.model.robot import Robot
+from screwkin.motors.library import IN_SERVOS, has_motor, table_folder
 from screwkin.servo.profiles import (
     Profile,
     load_profile,
@@ -33,7 +36,18 @@ from screwkin.servo.profiles import (
     ticks_from_radians,
 )
 
-KEYS = ("model", "models", "protocol", "baud", "ids", "direction", "zero", "range_deg", "stiffness")
+KEYS = (
+    "model",
+    "models",
+    "protocol",
+    "baud",
+    "ids",
+    "direction",
+    "zero",
+    "range_deg",
+    "stiffness",
+    *IN_SERVOS,
+)
 DEFAULT_BAUD = 1_000_000
 
 
@@ -91,11 +105,12 @@ class ServoMap:
         Raises:
             TableError: every fault of the section at once, each with the key and what would be right.
         """
-        faults, profiles = list(_faults(robot.joint_names, robot.servos)), {}
+        folder = table_folder(robot)
+        faults, profiles = list(_faults(robot.joint_names, robot.servos, folder)), {}
         for joint in robot.joint_names:
             try:
-                profiles[joint] = _profile_of(robot.servos, joint)
-            except UnknownNameError:
+                profiles[joint] = _profile_of(robot.servos, joint, folder)
+            except InputError:
                 continue  # listed among the faults
         if len(protocols := {profile.protocol for profile in profiles.values()}) > 1:
             fix = "Servos of one bus speak one protocol: change the models, or their firmware"
@@ -156,15 +171,15 @@ def _entries(value: Any) -> dict[str, Any]:
     return {f.name: getattr(value, f.name) for f in fields(value)}
 
 
-def _profile_of(servos: Mapping[str, Any], joint: str) -> Profile:
+def _profile_of(servos: Mapping[str, Any], joint: str, folder: Path | None) -> Profile:
     models = servos.get("models")
     model = models.get(joint, servos.get("model")) if isinstance(models, Mapping) else servos.get("model")
-    profile = load_profile(str(model))
+    profile = load_profile(str(model), folder)
     degrees: Any = servos.get("range_deg")
     return replace(profile, range_deg=float(degrees)) if _is_number(degrees) else profile
 
 
-def _faults(names: tuple[str, ...], servos: Mapping[str, Any]) -> Iterator[Fault]:
+def _faults(names: tuple[str, ...], servos: Mapping[str, Any], folder: Path | None) -> Iterator[Fault]:
     """Faults of the section's own keys and values."""
     if not servos:
         yield Fault("[servos]", "", "is missing", "Write at least model and ids there")
@@ -177,9 +192,8 @@ def _faults(names: tuple[str, ...], servos: Mapping[str, Any]) -> Iterator[Fault
     if isinstance(models["models"], Mapping):
         named += [(f"models.{joint}", model) for joint, model in models["models"].items()]
     for key, model in named:
-        if not isinstance(model, str) or not _known(model):
-            what = "is missing" if model is None else f"{model!r} is unknown"
-            yield Fault("[servos]", key, what, f"Known are {', '.join(profile_models())}")
+        if fault := "is missing" if model is None else _model_fault(model, folder):
+            yield Fault("[servos]", key, fault, f"Known are {', '.join(profile_models())}")
     for key in ("models", "ids", "direction", "zero"):
         table = servos.get(key, {})
         if not isinstance(table, Mapping):
@@ -242,12 +256,16 @@ def _line_faults(servos: Mapping[str, Any], profiles: Any) -> Iterator[Fault]:
             yield Fault("[servos]", "baud", str(error), "Write a rate that all servos have")
 
 
-def _known(model: str) -> bool:
-    try:
-        load_profile(model)
-    except UnknownNameError:
-        return False
-    return True
+def _model_fault(model: object, folder: Path | None) -> str:
+    """What is wrong with a model's name, empty if nothing."""
+    if isinstance(model, str):
+        try:
+            load_profile(model, folder)
+            return ""
+        except InputError as error:
+            if isinstance(error, TableError) or has_motor(model, folder):
+                return f"{model!r} has no registers that a bus could write: {error}"
+    return f"{model!r} is unknown"
 
 
 def _is_number(value: Any) -> bool:

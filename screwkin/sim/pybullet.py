@@ -17,7 +17,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,8 @@ from screwkin.model.urdf import urdf_frames, urdf_from_robot
 from screwkin.sim.backend import Command, Contact, Observation, moment_about_origin
 from screwkin.sim.camera import Camera
 from screwkin.sim.drive import UNLIMITED, RigidServos, Servos
+from screwkin.sim.motors import MotorServos
+from screwkin.sim.rotors import RelativeRotors, with_rotors
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,8 @@ class PyBulletBackend:
         self.dt = self._physics.dt
         self.settings: Mapping[str, Any] = asdict(self._physics)
         _check_feet(robot)
-        urdf = urdf_from_robot(_with_rotors(robot.with_inertia_floor(), self._servos.rotor_inertia))
+        steadied, rotors = not isinstance(self._servos, MotorServos), self._servos.rotor_inertia
+        urdf = urdf_from_robot(with_rotors(robot.with_inertia_floor(), rotors, steadied))
         self._p = _imported_pybullet()
         self._client = _connected(self._p, gui)
         self._here = {"physicsClientId": self._client}
@@ -108,6 +111,10 @@ class PyBulletBackend:
         self._joints = [names.index(name) for name in robot.joint_names]
         self._applied = np.zeros(len(names))
         self._release()
+        self._rotors: RelativeRotors | None = None
+        if not steadied:
+            floats = robot.base == "floating"
+            self._rotors = RelativeRotors(self._p, self._here, self._body, self._joints, rotors, floats)
         info = self._p.getDynamicsInfo(self._body, -1, **self._here)
         self._T_base_inertial = self._pose(info[3], info[4])
         self._T_inertial_base = np.linalg.inv(self._T_base_inertial)
@@ -210,6 +217,8 @@ class PyBulletBackend:
             p.resetJointState(self._body, index, q, 0.0, **here)
         self._servos.reset(np.array(state.q, dtype=float))
         self._applied = np.zeros(len(self._joints))
+        if self._rotors is not None:
+            self._rotors.reset()
         self._steps = 0
         if self._began is not None:
             self._began = time.monotonic()
@@ -243,6 +252,8 @@ class PyBulletBackend:
             p.setJointMotorControlArray(
                 self._body, self._joints, p.TORQUE_CONTROL, forces=action.torque.tolist(), **here
             )
+        if self._rotors is not None:
+            self._rotors.correct(action.torque, self.dt)
 
     def _show(self, began: float) -> None:
         """Keep a window's camera on the robot, and its time no faster than the world's."""
@@ -320,25 +331,6 @@ def _check_feet(robot: Robot) -> None:
             f"robot {robot.name}: {names} has no box, so it would sink into the floor. "
             "Give the link a box whose bottom is the sole."
         )
-
-
-def _with_rotors(robot: Robot, rotors: Array) -> Robot:
-    """The robot with a massless ball on every link, whose inertia is that of the rotor at its joint.
-
-    PyBullet knows no rotors that turn with a joint alone. The ball's inertia across the axis, and a base no
-    lighter than the largest ball, steady stiff springs between light links, which would swing up.
-    """
-    if not rotors.any():
-        return robot
-    links = {link.name: link for link in robot.links}
-    links[robot.base_link] = robot.with_inertia_floor(inertia=float(rotors.max())).link(robot.base_link)
-    for joint, rotor in zip(robot.joints, rotors.tolist(), strict=True):
-        if rotor and joint.type != "revolute":
-            raise InputError(f"PyBullet has no rotor at joint {joint.name}, which does not turn")
-        i = links[joint.child].inertia
-        ball = replace(i, xx=i.xx + rotor, yy=i.yy + rotor, zz=i.zz + rotor)
-        links[joint.child] = replace(links[joint.child], inertia=ball)
-    return replace(robot, links=tuple(links.values()))
 
 
 def _check_soles(physics: Physics) -> None:

@@ -91,7 +91,6 @@ def test_out_of_reach_is_the_answer_no_and_leaves_no_files(cli, refused, tmp_pat
         ),
         (["stiffness", "poppy12", *COARSE, "--stiffness", "-60"], "must be a positive number"),
         (["stiffness", "poppy12", *COARSE, "--stiffness", "nan"], "must be a positive number"),
-        (["stiffness", "bioloid", "--resolution", "0.01"], "bioloid has no joint stiffness"),
         (["stiffness", "poppy12", *COARSE, "--support", "left_foot"], "cannot support the robot"),
     ],
 )

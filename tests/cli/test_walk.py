@@ -163,7 +163,6 @@ def test_what_is_left_after_every_pass_is_printed_where_statics_lead(cli):
         ),
         (["poppy12", "--compensate", "joint", "-k", "-60"], 2, "stiffness is -60.0; it must be"),
         (["poppy12", "--compensate", "swing", "-k", "3"], 3, "the joints are too soft"),
-        (["bioloid", "--compensate", "joint"], 2, "bioloid has no joint stiffness; give one in N m/rad"),
         (["poppy12", "--passes", "2"], 2, "--passes is of a compensation; add --compensate swing, joint"),
         (["poppy12", "--stiffness", "60"], 2, "--stiffness is of a compensation"),
     ],

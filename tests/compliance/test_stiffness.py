@@ -281,6 +281,13 @@ def test_a_stiffness_that_is_no_positive_number_is_refused(robot, bad):
         static_deflection(robot, sk.home(robot), "right_foot", bad)
 
 
+def test_a_table_that_gives_no_stiffness_has_that_of_its_servo_models(robot):
+    """12 V behind 26.67 per rad drive 2 N m/A through 16 ohm: 40 N m/rad."""
+    servos = {name: value for name, value in robot.servos.items() if name != "stiffness"}
+    of_model = joint_stiffness(replace(robot, servos={**servos, "model": "AX-12A"}))
+    np.testing.assert_allclose(of_model, np.full(12, 40.0), rtol=1e-5)
+
+
 def test_other_wrong_input_is_told(robot):
     home = sk.home(robot)
     with pytest.raises(UnknownNameError, match="left_elbow"):

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from screwkin.errors import InputError, TableError, UnknownNameError
 from screwkin.model.table import load_robot
+from screwkin.motors.library import load_motor, motor_text
 from screwkin.servo.profiles import (
     baud_from_register,
     decode,
@@ -216,6 +217,23 @@ def test_all_faults_of_a_robots_servos_are_told_at_once():
     ):
         assert part in text
     assert len(told.value.faults) == 10
+
+
+def test_a_model_of_which_only_the_motor_is_known_is_refused_by_the_bus_alone(tmp_path):
+    robot = load_robot("bioloid")
+    with pytest.raises(TableError, match="'XL430' has no registers that a bus could write"):
+        ServoMap.of(replace(robot, servos={**robot.servos, "model": "XL430"}))
+
+
+def test_a_users_file_has_the_registers_of_the_model_that_it_names(tmp_path):
+    mine = tmp_path / "mine.toml"
+    model = load_motor("AX-12A")
+    mine.write_text(motor_text(replace(model, model="mine", registers="AX-12A")), encoding="utf-8")
+    assert load_profile(str(mine)) is load_profile("AX-12A")
+    assert load_profile("mine.toml", tmp_path) is load_profile("AX-12A")
+    mine.write_text(motor_text(replace(model, model="mine")), encoding="utf-8")
+    with pytest.raises(UnknownNameError, match="simulated"):
+        load_profile(str(mine))
 
 
 @pytest.mark.parametrize(

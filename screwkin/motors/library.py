@@ -1,0 +1,236 @@
+"""Figures of servo models: bundled ones by name, a user's own by the path of a TOML file.
+
+model = "XL330"
+aliases = ["XL330-M288"]
+source = "who measured it"
+identified = true
+registers = "AX-12A"             # only in a user's file: the model whose registers the bus finds there
+
+[motor]                          # see ``Motor``; what is left out is its default
+constant = 0.38                  # N m/A
+…
+[motor.friction]                 # see ``Friction``
+coulomb = 0.0089
+[ranges]                         # least and greatest value of figures that are not certain
+constant = [0.3, 0.5]
+"""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import MISSING, fields, replace
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from screwkin.errors import Fault, InputError, TableError, UnknownNameError
+from screwkin.model.robot import Robot
+from screwkin.motors.records import Friction, Motor, MotorModel
+
+POSITIVE = ("constant", "resistance", "voltage", "gain", "kp", "max_duty", "max_current", "speed", "shape")
+IN_SERVOS = {"gain": "kp", "voltage": "voltage", "lag": "lag"}
+"""Keys of ``[servos]`` in a robot's table that stand for figures of all its motors."""
+
+_FIGURES = tuple(f.name for f in fields(Motor) if f.name != "friction")
+_COEFFICIENTS = tuple(f.name for f in fields(Friction))
+_NEEDED = tuple(f.name for f in fields(Motor) if f.default is MISSING and f.default_factory is MISSING)
+
+
+@cache
+def motor_models() -> tuple[str, ...]:
+    """Names of the bundled models, in order of the alphabet."""
+    return tuple(sorted(model.model for model in _bundled()))
+
+
+def load_motor(name_or_path: str | Path, folder: Path | None = None) -> MotorModel:
+    """The figures of a servo model, by its name or alias (case does not matter) or by the path of its file.
+
+    Args:
+        name_or_path: a name, or a path that ends in ``.toml``.
+        folder: where relative paths begin, besides the working folder.
+
+    Raises:
+        UnknownNameError: neither a model nor a file. TableError: every fault of the file.
+    """
+    name = str(name_or_path).strip()
+    if name.lower().endswith(".toml"):
+        for path in (Path(name), *([folder / name] if folder else [])):
+            if path.is_file():
+                return _read(path.read_bytes(), str(path))
+        raise UnknownNameError("servo model file", name, motor_models())
+    for model in _bundled():
+        if name.lower() in {known.lower() for known in (model.model, *model.aliases)}:
+            return model
+    raise UnknownNameError("servo model with figures of its motor", name, motor_models())
+
+
+def motors_of(robot: Robot) -> tuple[Motor, ...]:
+    """The motor of every joint, in table order, as ``[servos]`` of the robot's table names its model.
+
+    Raises:
+        InputError: the table names no model for a joint. UnknownNameError, TableError: see ``load_motor``.
+    """
+    return tuple(
+        _with_supply(load_motor(name, table_folder(robot)).motor, robot.servos) for name in _names(robot)
+    )
+
+
+def names_motors(robot: Robot) -> bool:
+    """Whether the table names servo models that all have figures of their motors."""
+    try:
+        return bool(motors_of(robot))
+    except InputError:
+        return False
+
+
+def has_motor(model: str, folder: Path | None = None) -> bool:
+    """Whether a name or a path stands for figures of a motor."""
+    try:
+        return bool(load_motor(model, folder))
+    except InputError:
+        return False
+
+
+def table_folder(robot: Robot) -> Path | None:
+    """The folder of a robot's table, where paths in it begin."""
+    return Path(robot.path).parent if robot.path else None
+
+
+def motors_named(robot: Robot, name: str) -> tuple[Motor, ...]:
+    """The same model in every joint of a robot.
+
+    Raises:
+        UnknownNameError, TableError: see ``load_motor``.
+    """
+    return (_with_supply(load_motor(name, table_folder(robot)).motor, robot.servos),) * len(robot.joints)
+
+
+def motor_text(model: MotorModel) -> str:
+    """The file of a model, which ``load_motor`` reads again."""
+    friction = model.motor.friction
+    lines = [
+        f"model = {_quoted(model.model)}",
+        f"aliases = [{', '.join(map(_quoted, model.aliases))}]",
+        f"source = {_quoted(model.source)}",
+        f"identified = {str(model.identified).lower()}",
+        *([f"registers = {_quoted(model.registers)}"] if model.registers else []),
+        "",
+        "[motor]",
+        *(f"{name} = {_number(getattr(model.motor, name))}" for name in _FIGURES),
+        "",
+        "[motor.friction]",
+        *(f"{name} = {_number(getattr(friction, name))}" for name in _COEFFICIENTS),
+    ]
+    if model.ranges:
+        rows = (f"{name} = [{_number(a)}, {_number(b)}]" for name, (a, b) in model.ranges.items())
+        lines += ["", "[ranges]", *rows]
+    return "\n".join(lines) + "\n"
+
+
+@cache
+def _bundled() -> tuple[MotorModel, ...]:
+    folder = files("screwkin.motors") / "models"
+    names = sorted(entry.name for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    return tuple(_read((folder / name).read_bytes(), name) for name in names)
+
+
+def _names(robot: Robot) -> tuple[str, ...]:
+    """The servo model of every joint."""
+    models, common = robot.servos.get("models", {}), robot.servos.get("model")
+    chosen = {
+        name: models.get(name, common) if isinstance(models, Mapping) else common
+        for name in robot.joint_names
+    }
+    missing = [name for name, model in chosen.items() if not isinstance(model, str)]
+    if missing or not chosen:
+        raise InputError(
+            f"{robot.name} names no servo model for {', '.join(missing) or 'any joint'}; write model under "
+            "[servos] of its table"
+        )
+    return tuple(map(str, chosen.values()))
+
+
+def _with_supply(motor: Motor, servos: Mapping[str, Any]) -> Motor:
+    """The motor with the gain, supply and lag that the robot's table gives.
+
+    Raises:
+        InputError: one of them is no number, or negative.
+    """
+    given = {name: servos[key] for key, name in IN_SERVOS.items() if key in servos}
+    faults = list(_number_faults("[servos]", given, _FIGURES))
+    if faults:
+        raise InputError("; ".join(map(str, faults)))
+    return replace(motor, **given)
+
+
+def _read(data: bytes, where: str) -> MotorModel:
+    try:
+        table = tomllib.loads(data.decode("utf-8"))
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{where} is no TOML file: {error}") from None
+    faults = list(_faults(table))
+    if faults:
+        raise TableError(where, faults)
+    figures = dict(table["motor"])
+    friction = Friction(**figures.pop("friction", {}))
+    return MotorModel(
+        str(table["model"]),
+        tuple(map(str, table.get("aliases", ()))),
+        str(table.get("source", "")),
+        table.get("identified") is True,
+        Motor(**figures, friction=friction),
+        MappingProxyType({name: (float(a), float(b)) for name, (a, b) in table.get("ranges", {}).items()}),
+        str(table.get("registers", "")),
+    )
+
+
+def _faults(table: Mapping[str, Any]) -> Iterator[Fault]:
+    """Every fault of a model's file."""
+    if not isinstance(table.get("model"), str):
+        yield Fault("", "model", f"is {table.get('model')!r}", "Write the name of the servo model")
+    motor = table.get("motor")
+    if not isinstance(motor, Mapping):
+        yield Fault("[motor]", "", "is missing", f"Write at least {', '.join(_NEEDED)} there")
+        return
+    friction = motor.get("friction", {})
+    if not isinstance(friction, Mapping):
+        yield Fault("[motor]", "friction", f"is {friction!r}", "Write a table [motor.friction]")
+        friction = {}
+    for name in _NEEDED:
+        if name not in motor:
+            yield Fault("[motor]", name, "is missing", "Write a number")
+    yield from _number_faults("[motor]", {k: v for k, v in motor.items() if k != "friction"}, _FIGURES)
+    yield from _number_faults("[motor.friction]", friction, _COEFFICIENTS)
+    ranges = table.get("ranges", {})
+    for name, ends in ranges.items() if isinstance(ranges, Mapping) else ():
+        pair = isinstance(ends, list) and len(ends) == 2 and all(map(_is_number, ends))
+        if name not in (*_FIGURES, *_COEFFICIENTS) or not pair:
+            yield Fault("[ranges]", name, f"is {ends!r}", "Write NAME = [LEAST, GREATEST] of a figure")
+
+
+def _number_faults(place: str, given: Mapping[str, Any], known: tuple[str, ...]) -> Iterator[Fault]:
+    for name, value in given.items():
+        if name not in known:
+            yield Fault(place, name, "is unknown", f"Known are {', '.join(known)}")
+        elif not (_is_number(value) or (name == "max_current" and value == math.inf)):
+            yield Fault(place, name, f"is {value!r}", "Write a finite number")
+        elif value < 0 or (value == 0 and name in POSITIVE):
+            least = "above 0" if name in POSITIVE else "of at least 0"
+            yield Fault(place, name, f"is {value!r}", f"Write a number {least}")
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _number(value: Any) -> str:
+    return repr(float(value))
+
+
+def _quoted(text: str) -> str:
+    escaped = "".join(c if c.isprintable() else " " for c in text).replace("\\", "\\\\").replace('"', '\\"')
+    return f'"{escaped}"'
