@@ -210,7 +210,7 @@ def reasons_of(facts: Measured, rule: Criteria) -> tuple[str, ...]:
         if not math.isfinite(value)
     ]
     if not confirms(facts.engine):
-        reasons.append(f"engine {facts.engine} simulates no forces and confirms nothing; use {PROVING[-1]}")
+        reasons.append(f"engine {facts.engine} simulates no forces and confirms nothing; use {PROVING[0]}")
     elif facts.zmp_rms_mm is None or facts.zmp_max_mm is None:
         reasons.append("no ZMP was measured: nothing pressed on the floor")
     if facts.fell or facts.fell_at is not None:
