@@ -1,0 +1,32 @@
+"""The list of walks, and what is said of two engines' verdicts on them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import screwkin as sk
+from benchmarks.verdicts import Outcome, Walk, markdown, walks
+
+
+def test_the_list_holds_a_hundred_different_walks_of_three_robots() -> None:
+    rows = walks()
+    assert len(rows) == len(set(rows)) == 100
+    assert len({row.robot for row in rows}) == 3
+    for row in rows:
+        assert sk.load_gait(row.gait).name == row.gait
+        assert row.robot in sk.robot_names()
+
+
+def test_verdicts_that_differ_are_listed_with_their_reasons() -> None:
+    walk = Walk("one", "walk", 1.0, 0.1)
+    good = Outcome(walk, "rigid", "pybullet", True, (), 0.2, 1.0)
+    bad = replace(good, engine="mujoco", passed=False, reasons=("a stance foot slips",), zmp_rms_mm=0.7)
+    other = replace(good, walk=replace(walk, gait="turn"))
+    text = markdown([good, bad, other, replace(other, engine="mujoco")])
+    assert "| rigid | 2 | 1 | 1 | 0 |" in text
+    assert (
+        "- one walk, Tc 1 s, stride 0.1 m, servos rigid. pybullet: passes; mujoco: a stance foot slips"
+        in text
+    )
+    assert "mujoco, rigid servos" in text
+    assert "0.70 mm" in text
