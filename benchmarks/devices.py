@@ -84,7 +84,7 @@ def inputs(robot: Robot, count: int) -> Iterator[tuple[Program, dict[str, Array]
             target = sk.frame_pose(robot, sk.State(**state), robot.limb(chain.limb).tip)
             own = np.broadcast_to(home[list(chain.joints)], (count, len(chain.joints)))
             wanted = {"target": target if pose else target[:, :3, 3], "guess": own}
-            yield limbs.limb_pose(chain, not pose), {"T_world_base": given.T_world_base, **wanted}
+            yield limbs.limb_pose(chain, not pose).program, {"T_world_base": given.T_world_base, **wanted}
 
 
 def measured(
