@@ -33,6 +33,10 @@ def convert(
     convention: Annotated[
         str, typer.Option(metavar="NAME", help="Of a DH file to write: modified or standard.")
     ] = "modified",
+    repair: Annotated[
+        bool,
+        typer.Option("--repair", help="Of a URDF to read: replace inertias that no body has by the nearest."),
+    ] = False,
     as_json: AsJson = False,
 ) -> int:
     """Convert a robot between screw tables (.toml), URDF (.urdf) and Denavit-Hartenberg tables (.csv).
@@ -40,10 +44,11 @@ def convert(
     What the target cannot hold is listed. Formulas and mirrored limbs are written out.
     """
     chosen = one_of("convention", convention, CONVENTIONS)
-    if target.suffix not in FORMATS:
+    suffix = target.suffix.lower()
+    if suffix not in FORMATS:
         raise InputError(f"cannot write {target}: OUT must end with {', '.join(FORMATS)}")
-    robot, remarks = _read(source)
-    text, lost = _written(robot, target.suffix, chosen)
+    robot, remarks = _read(source, repair)
+    text, lost = _written(robot, suffix, chosen)
     with atomic_write(target) as file:
         file.write(text)
     remarks += lost
@@ -53,16 +58,18 @@ def convert(
     else:
         print(f"{target}: {robot.name}, {len(robot.links)} links, {len(robot.joints)} joints")
         for text in remarks:
-            remark(text)
+            remark(f"remark: {text}")
     return 0
 
 
-def _read(source: str) -> tuple[Robot, list[str]]:
+def _read(source: str, repair: bool) -> tuple[Robot, list[str]]:
     """The robot of a name or file, and remarks on what its format leaves open."""
-    suffix = Path(source).suffix
+    suffix = Path(source).suffix.lower()
     if suffix == ".urdf":
-        read = load_urdf(source)
+        read = load_urdf(source, repair)
         return read.robot, list(read.remarks)
+    if repair:
+        raise InputError(f"--repair mends a URDF that is read, and {source} is none; edit it")
     if suffix == ".csv":
         robot = robot_from_dh(load_dh(source), Path(source).stem, source)
         return robot, ["DH tables hold no masses, limits and soles: add those that the robot has"]
