@@ -22,6 +22,7 @@ from screwkin.model.toml_out import robot_toml
 from screwkin.model.urdf import urdf_from_robot
 from screwkin.model.urdf_in import load_urdf
 
+_FRAMES = "URDF holds no limbs, postures and servos; tips and soles are frames fixed to their links"
 FORMATS = (".toml", ".urdf", ".csv")
 
 
@@ -85,7 +86,7 @@ def _written(robot: Robot, suffix: str, convention: Convention) -> tuple[str, li
     }
     lost = {
         ".toml": [],
-        ".urdf": ["URDF holds no limbs, soles, postures and servos"] if robot.limbs else [],
+        ".urdf": [_FRAMES] if robot.limbs else [],
         ".csv": ["DH tables hold the chains' geometry only: no masses, limits, soles and closures"],
     }
     return writers[suffix](), lost[suffix]
