@@ -21,6 +21,7 @@ from screwkin.model.table import load_robot
 from screwkin.model.toml_out import robot_toml
 from screwkin.model.urdf import urdf_from_robot
 from screwkin.model.urdf_in import load_urdf
+from screwkin.model.urdf_xml import MIMICS, Mimic
 
 _FRAMES = "URDF holds no limbs, postures and servos; tips and soles are frames fixed to their links"
 FORMATS = (".toml", ".urdf", ".csv")
@@ -38,6 +39,13 @@ def convert(
         bool,
         typer.Option("--repair", help="Of a URDF to read: replace inertias that no body has by the nearest."),
     ] = False,
+    mimic: Annotated[
+        str,
+        typer.Option(
+            metavar="HOW",
+            help="Coupled joints of a URDF to read: refuse them, or read them as free joints with a remark.",
+        ),
+    ] = "refuse",
     as_json: AsJson = False,
 ) -> int:
     """Convert a robot between screw tables (.toml), URDF (.urdf) and Denavit-Hartenberg tables (.csv).
@@ -48,7 +56,8 @@ def convert(
     suffix = target.suffix.lower()
     if suffix not in FORMATS:
         raise InputError(f"cannot write {target}: OUT must end with {', '.join(FORMATS)}")
-    robot, remarks = _read(source, repair)
+    coupled = one_of("way to read mimic", mimic, MIMICS)
+    robot, remarks = _read(source, repair, coupled)
     text, lost = _written(robot, suffix, chosen)
     with atomic_write(target) as file:
         file.write(text)
@@ -63,14 +72,14 @@ def convert(
     return 0
 
 
-def _read(source: str, repair: bool) -> tuple[Robot, list[str]]:
+def _read(source: str, repair: bool, mimic: Mimic) -> tuple[Robot, list[str]]:
     """The robot of a name or file, and remarks on what its format leaves open."""
     suffix = Path(source).suffix.lower()
     if suffix == ".urdf":
-        read = load_urdf(source, repair)
+        read = load_urdf(source, repair, mimic)
         return read.robot, list(read.remarks)
-    if repair:
-        raise InputError(f"--repair mends a URDF that is read, and {source} is none; edit it")
+    if repair or mimic == "free":
+        raise InputError(f"--repair and --mimic are for a URDF that is read, and {source} is none; edit it")
     if suffix == ".csv":
         robot = robot_from_dh(load_dh(source), Path(source).stem, source)
         return robot, ["DH tables hold no masses, limits and soles: add those that the robot has"]

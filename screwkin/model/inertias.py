@@ -49,17 +49,18 @@ def broken_triangle(inertia: Inertia) -> str:
 
 
 def without_noise(inertia: Inertia, mass: float) -> Inertia:
-    """The inertia with zero for principal moments that are negative by rounding.
+    """The inertia with zero for what is rounding, else itself.
 
-    Rounding is what nine written digits leave, or a radius of gyration below a micrometre. Other negative
-    moments stay.
+    Rounding is a negative principal moment of what nine written digits leave, or an inertia of which every
+    radius of gyration is below a micrometre.
     """
-    matrix = inertia_matrix(inertia)
-    moments, axes = np.linalg.eigh(matrix)
-    least = max(_RELATIVE * abs(moments[2]), _GYRATION * mass, np.finfo(float).eps * _GYRATION)
-    if moments[0] >= 0 or moments[0] < -least:
-        return inertia
-    return inertia_from_matrix((axes * np.maximum(moments, 0)) @ axes.T)
+    moments, axes = np.linalg.eigh(inertia_matrix(inertia))
+    least = _GYRATION * mass
+    if moments.any() and np.abs(moments).max() <= least:
+        return Inertia(0, 0, 0)
+    if -max(_RELATIVE * moments[2], least) <= moments[0] < 0:
+        return inertia_from_matrix((axes * np.maximum(moments, 0)) @ axes.T)
+    return inertia
 
 
 def nearest_body(inertia: Inertia) -> Inertia:

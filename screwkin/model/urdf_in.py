@@ -35,6 +35,7 @@ from screwkin.model.urdf_xml import (
     TYPES,
     Edge,
     Element,
+    Mimic,
     Reader,
     base_of,
     from_root,
@@ -47,7 +48,7 @@ _UNLIMITED = 1e9  # written by programs that have no word for infinity, this one
 _WHOLE = 1e-9  # how far a turned box may be from the base axes
 _KEPT = {
     "robot": {"link", "joint", "material"},
-    "joint": {"origin", "parent", "child", "axis", "limit"},
+    "joint": {"origin", "parent", "child", "axis", "limit", "mimic"},
 }
 _NO_NAME = re.compile(r"[^A-Za-z0-9_-]+")
 _IMPOSSIBLE = "inertia read as it stands though no body has it (to repair: convert --repair)"
@@ -63,20 +64,21 @@ class UrdfRobot:
     remarks: tuple[str, ...]
 
 
-def load_urdf(path: str | Path, repair: bool = False) -> UrdfRobot:
+def load_urdf(path: str | Path, repair: bool = False, mimic: Mimic = "refuse") -> UrdfRobot:
     """The robot of a URDF file, with remarks on what a table cannot hold.
 
     Args:
         path: of the file.
         repair: as of ``parse_urdf``.
+        mimic: as of ``parse_urdf``.
 
     Raises:
         TableError: the file cannot be read or has faults; it lists all of them.
     """
-    return parse_urdf(read_text(Path(path), TableError), str(path), repair)
+    return parse_urdf(read_text(Path(path), TableError), str(path), repair, mimic)
 
 
-def parse_urdf(text: str, path: str = "<text>", repair: bool = False) -> UrdfRobot:
+def parse_urdf(text: str, path: str = "<text>", repair: bool = False, mimic: Mimic = "refuse") -> UrdfRobot:
     """The robot of a URDF text; its base is fixed if the root link is called ``world``, else floating.
 
     Args:
@@ -84,6 +86,8 @@ def parse_urdf(text: str, path: str = "<text>", repair: bool = False) -> UrdfRob
         path: where it comes from, for messages and for ``Robot.path``.
         repair: replace inertias that break the triangle inequality by the nearest that keep it, and say so
             in the table's ``source``; else they stay as they stand, with a remark.
+        mimic: ``refuse`` coupled joints, which tables have no word for, or read them as ``free`` joints of
+            their own, with their coupling as a remark.
 
     Raises:
         TableError: the text has faults; it lists all of them.
@@ -91,16 +95,13 @@ def parse_urdf(text: str, path: str = "<text>", repair: bool = False) -> UrdfRob
     root = read_root(text, path)
     reader = Reader()
     links = dict(named(reader, root, "link"))
-    joints = list(read_joints(reader, root, links))
+    joints = list(read_joints(reader, root, links, mimic))
     base = base_of(reader, links, joints)
     if reader.faults:
         raise TableError(path, reader.faults)
     _note_left_out(reader, root, joints)
     names = _unique_names(reader, links)
     bodies = _bodies(base, joints, names)
-    for edge in joints:
-        if edge.type == "fixed":
-            reader.note(f"fixed to {bodies[edge.child].name} and merged into it", edge.child)
     for name, element in links.items():
         _add_mass(reader, bodies[name], name, element, repair)
         _add_boxes(reader, bodies[name], name, element)
@@ -108,7 +109,7 @@ def parse_urdf(text: str, path: str = "<text>", repair: bool = False) -> UrdfRob
     rows = [_joint(reader, edge, bodies[edge.parent], bodies[edge.child]) for edge in moving]
     whole = list({id(bodies[name]): bodies[name] for name in links}.values())
     parts = [_link(body) for body in whole]
-    _audit_bodies(reader, whole, parts, names[base])
+    _audit_bodies(reader, whole, parts, base, names)
     repaired = ", with repaired inertias" if _REPAIRED in reader.notes else ""
     robot = RobotRecord(
         name=_name(root.get("name", "") or "robot"),
@@ -125,14 +126,19 @@ def parse_urdf(text: str, path: str = "<text>", repair: bool = False) -> UrdfRob
     return UrdfRobot(Robot.from_text(robot_toml(robot), path), (*reader.remarks, lost))
 
 
-def _audit_bodies(reader: Reader, bodies: Sequence[_Body], parts: Sequence[Link], base: str) -> None:
-    """Negative moments of a whole body, are faults; moving without mass, remarks."""
+def _audit_bodies(
+    reader: Reader, bodies: Sequence[_Body], parts: Sequence[Link], base: str, names: Mapping[str, str]
+) -> None:
+    """Negative moments of a whole body are faults; moving without mass, and merged links, are remarks."""
     for body, part in zip(bodies, parts, strict=True):
         if found := negative_moments(part.inertia):
             row = f"<link> {', '.join(map(repr, body.negative)) or repr(body.name)}"
             fix = "Write moments about the CoM in the axes of <inertial>, or repair it: convert --repair"
             reader.fault(row, "inertia", found, fix)
-        if not part.mass and part.name != base:
+        if len(body.poses) > 1:
+            merged = [name for name in body.poses if names[name] != body.name]
+            reader.note("merged, as fixed to one another", f"{' + '.join(merged)} into {body.name}")
+        if not part.mass and base not in body.poses:
             reader.note("moves without mass, which simulators need (Robot.with_inertia_floor)", part.name)
 
 
@@ -203,11 +209,11 @@ def _add_mass(reader: Reader, body: _Body, name: str, link: Element, repair: boo
     moments = [reader.numbers(row, inertial.find("inertia"), key, (0.0,))[0] for key in keys]
     if mass < 0:
         reader.fault(row, "mass", f"{mass:g} is negative", "Write a mass >= 0 in kg")
-    if mass > 0 and not any(moments):
-        reader.note("mass without inertia, taken as a point", name)
     if mass == 0 and any(moments):
         reader.note("inertia without mass", name)
     inertia = _audited(reader, name, Inertia(*moments), mass, repair)
+    if mass > 0 and not inertia_matrix(inertia).any():
+        reader.note("mass without inertia, taken as a point", name)
     if negative_moments(inertia):
         body.negative.append(name)
     R = as_array(here.R)
@@ -218,7 +224,7 @@ def _audited(reader: Reader, name: str, inertia: Inertia, mass: float, repair: b
     """An inertia without noise; what no body can have is a remark, or repaired."""
     clean = without_noise(inertia, mass)
     if clean is not inertia:
-        reader.note("negative moments of inertia as small as rounding, taken as 0", name)
+        reader.note("moments of inertia as small as rounding, taken as 0", name)
     if found := negative_moments(clean) or broken_triangle(clean):
         reader.note(_REPAIRED if repair else _IMPOSSIBLE, f"{name} has {found}")
         return nearest_body(clean) if repair else clean

@@ -7,7 +7,7 @@ import re
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal, get_args
 
 from screwkin.algebra.scalar import structural
 from screwkin.algebra.se3 import Pose, Vector, X, Y, Z, rotate
@@ -15,6 +15,9 @@ from screwkin.errors import Fault, TableError
 from screwkin.model.records import JointType
 
 Element = Any
+Mimic = Literal["refuse", "free"]
+"""What becomes of joints that follow others."""
+MIMICS: tuple[Mimic, ...] = get_args(Mimic)
 
 _DECLARATION = re.compile(r"<\?xml\s[^<>]*\?>")
 _FIX = "Give a URDF file: XML with <robot> around <link> and <joint>"
@@ -145,16 +148,15 @@ class Edge:
     element: Element
 
 
-def read_joints(reader: Reader, root: Element, links: Mapping[str, Element]) -> Iterator[Edge]:
+def read_joints(reader: Reader, root: Element, links: Mapping[str, Element], mimic: Mimic) -> Iterator[Edge]:
     """The joints, with all their faults."""
+    known = {element.get("name", "") for element in root.findall("joint")}
     for name, element in named(reader, root, "joint"):
         row, kind = f"<joint> {name!r}", element.get("type", "")
         if kind not in (*TYPES, "fixed"):
             reader.fault(row, "type", f"is {kind!r}", f"Supported: {', '.join((*TYPES, 'fixed'))}")
-        if element.find("mimic") is not None:
-            reader.fault(
-                row, "mimic", "couples two joints", "Remove it, and couple them where they are driven"
-            )
+        if kind != "fixed" and element.find("mimic") is not None:
+            _read_mimic(reader, name, element.find("mimic"), known, mimic)
         ends = []
         for key in ("parent", "child"):
             end = element.find(key)
@@ -165,6 +167,22 @@ def read_joints(reader: Reader, root: Element, links: Mapping[str, Element]) -> 
             ends.append(link)
         axis = X if kind == "fixed" else _axis(reader, row, element)
         yield Edge(name, kind, ends[0], ends[1], reader.origin(row, element), axis, element)
+
+
+def _read_mimic(reader: Reader, name: str, element: Element, known: set[str], mimic: Mimic) -> None:
+    """A coupling to another joint: a fault, or a remark that says it."""
+    row, leader = f"<joint> {name!r}", element.get("joint", "")
+    (factor,) = reader.numbers(row, element, "multiplier", (1.0,))
+    (offset,) = reader.numbers(row, element, "offset", (0.0,))
+    coupling = f"{name} = {factor:g} {leader} {offset + 0.0:+g}"
+    if leader not in known:
+        reader.fault(row, "mimic", f"there is no joint {leader!r}", "Name a joint of the file")
+    elif mimic == "refuse":
+        found = f"couples two joints, {coupling}, which tables cannot say"
+        fix = "Read it as a joint of its own, and keep the coupling where it is driven: convert --mimic free"
+        reader.fault(row, "mimic", found, fix)
+    else:
+        reader.note("coupled in the file, here joints of their own: drive them so", coupling)
 
 
 def _axis(reader: Reader, row: str, element: Element) -> Vector:

@@ -66,7 +66,7 @@ def test_the_convention_of_a_dh_file_can_be_chosen(cli, tmp_path, convention):
         (["linkages/four-bar", "out.urdf"], "URDF has no closed loops"),
         (["none.urdf", "out.toml"], "cannot be read"),
         (["none.csv", "out.toml"], "cannot be read"),
-        (["poppy12", "out.toml", "--repair"], "--repair mends a URDF that is read, and poppy12 is none"),
+        (["poppy12", "out.toml", "--repair"], "are for a URDF that is read"),
         (["nobody", "out.toml"], "unknown robot 'nobody'"),
         (["poppy12", "no/such/folder/out.toml"], "no/such/folder"),
     ],

@@ -152,7 +152,7 @@ def test_what_cannot_be_kept_is_told():
     for remark in (
         "left out: transmission",
         "renamed, as a table needs plain names: 'tool tip' to tool_tip",
-        "fixed to upper and merged into it: tool tip",
+        "merged, as fixed to one another: tool tip into upper",
         "left out, as only boxes along the axes stay for contact: mesh of upper, turned box of upper",
         "velocity not above 0, taken as no limit: shoulder",
         "URDF names no limbs, soles and postures",
@@ -163,6 +163,37 @@ def test_what_cannot_be_kept_is_told():
 def test_what_joints_hold_beyond_their_limits_is_told():
     found = parse_urdf(ARM.replace("<limit", '<dynamics damping="1"/><mimics/><limit'))
     assert "left out of joints: dynamics, mimics" in found.remarks
+
+
+GRIPPER = ARM.replace(
+    "</robot>",
+    """<link name="finger"><inertial><mass value="0.3"/><origin xyz="0.1 0 0.2"/>
+      <inertia ixx="0.002" iyy="0.002" izz="0.001" ixy="0" ixz="0" iyz="0"/></inertial></link>
+      <joint name="follower" type="revolute"><parent link="upper"/><child link="finger"/>
+      <limit lower="-9" upper="9" velocity="1" effort="1"/>
+      <mimic joint="shoulder" multiplier="-2" offset="0.1"/></joint></robot>""",
+)
+
+
+def test_coupled_joints_are_refused_with_their_coupling():
+    """A table has no word for them: nothing is read as if they were free unless one asks for it."""
+    told = "<joint> 'follower', key mimic: couples two joints, follower = -2 shoulder +0.1, which tables"
+    with pytest.raises(TableError, match=re.escape(told)):
+        parse_urdf(GRIPPER)
+
+
+def test_coupled_joints_read_as_free_move_as_pinocchio_couples_them():
+    found = parse_urdf(GRIPPER, mimic="free")
+    assert any(remark.endswith("drive them so: follower = -2 shoulder +0.1") for remark in found.remarks)
+    model = pin.buildModelFromXML(GRIPPER, mimic=True)
+    data = model.createData()
+    assert model.nq == 1
+    for q in (-0.7, 0.4):
+        pin.framesForwardKinematics(model, data, np.array([q]))
+        displaced = link_displacements(found.robot, [q, -2 * q + 0.1])
+        for link, D in zip(found.robot.links, displaced, strict=True):
+            placed = data.oMf[model.getFrameId(link.name, pin.FrameType.BODY)].homogeneous
+            np.testing.assert_allclose(as_array(D @ link.frame), placed, rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize("axis", ['<axis xyz="0 0 0"/>', '<axis xyz="none"/>', ""])
@@ -207,7 +238,7 @@ def test_a_mass_without_inertia_is_read_as_a_point():
 def test_negative_moments_of_rounding_are_zero(noise):
     found = parse_urdf(ARM.replace('izz="0.01"', f'izz="{noise}"'))
     assert np.linalg.eigvalsh(inertia_matrix(found.robot.link("upper").inertia))[0] >= 0
-    assert "negative moments of inertia as small as rounding, taken as 0: upper" in found.remarks
+    assert "moments of inertia as small as rounding, taken as 0: upper" in found.remarks
 
 
 def test_inertia_against_the_triangle_rule_stands_with_a_remark_and_is_repaired_on_request():
@@ -325,7 +356,11 @@ def test_a_long_or_deep_file_takes_no_ages():
         ('xyz="0 1 0"', 'xyz="0 1"', "<joint> 'shoulder', key xyz: found '0 1'. Write 3 finite number(s)"),
         ('value="2"', 'value="nan"', "<link> 'upper', key value: found 'nan'. Write 1 finite number(s)"),
         ('value="2"', 'value="-2"', "<link> 'upper', key mass: -2 is negative. "),
-        ('<axis xyz="0 1 0"/>', '<mimic joint="x"/>', "<joint> 'shoulder', key mimic: couples two joints. "),
+        (
+            '<axis xyz="0 1 0"/>',
+            '<mimic joint="x"/>',
+            "<joint> 'shoulder', key mimic: there is no joint",
+        ),
         ('link name="upper"', "link", "<link> 2, key name: is missing. "),
         ('link name="upper"', 'link name="base"', "<link> 'base', key name: is there twice. "),
         ("</robot>", '<link name="stray"/></robot>', "file, key link: roots: base, stray. "),
