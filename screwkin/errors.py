@@ -44,6 +44,10 @@ class UnknownNameError(InputError, LookupError):
         return str(self.args[0])
 
 
+class RobotRemark(UserWarning):
+    """What a robot's file leaves open, or says and a table cannot hold; the robot is read all the same."""
+
+
 @dataclass(frozen=True)
 class Fault:
     """One wrong place of a file: where it is, what stands there and what would be right."""

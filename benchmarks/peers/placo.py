@@ -12,7 +12,7 @@ from benchmarks.contest import Contestant, Contestants, Result
 from benchmarks.workloads import Reach, Stance
 from screwkin.algebra.se3 import as_array
 from screwkin.model.robot import Limb, Robot
-from screwkin.model.urdf import urdf_frames, urdf_from_robot
+from screwkin.model.urdf import urdf_frames, urdf_of_bodies
 
 Array = Any
 TOLERANCE, MOST = 1e-7, 50
@@ -27,7 +27,7 @@ def _urdf(robot: Robot) -> str:
         p = " ".join(repr(float(c)) for c in as_array((frames[limb.link].inverse @ limb.frame).p))
         ends = f'<parent link="{limb.link}"/><child link="{limb.tip}"/><origin xyz="{p}"/>'
         tips.append(f'<link name="{limb.tip}"/><joint name="to_{limb.tip}" type="fixed">{ends}</joint>')
-    text: str = urdf_from_robot(robot.with_inertia_floor())
+    text: str = urdf_of_bodies(robot.with_inertia_floor())
     return text.replace("</robot>", "".join(tips) + "</robot>")
 
 

@@ -112,12 +112,15 @@ def _dispatch(words: Sequence[str]) -> int:
     one_of("verb", name, VERBS)
     import typer
 
+    from screwkin.cli.output import remarks_of_robots
+
     verb = getattr(import_module(f"screwkin.cli.{name}"), name)
     app = verb if isinstance(verb, typer.Typer) else typer.Typer(**APP)
     if app is not verb:
         app.command(name)(verb)
     try:
-        code: Any = app(args=list(words[1:]), prog_name=f"screwkin {name}", standalone_mode=False)
+        with remarks_of_robots():
+            code: Any = app(args=list(words[1:]), prog_name=f"screwkin {name}", standalone_mode=False)
     except typer.Abort:
         code = _INTERRUPTED
     if code == _INTERRUPTED:  # typer's answer to an interrupt, older versions abort

@@ -21,7 +21,9 @@ from screwkin.model.table import load_robot
 from screwkin.model.toml_out import robot_toml
 from screwkin.model.urdf import urdf_from_robot
 from screwkin.model.urdf_in import load_urdf
+from screwkin.model.urdf_xml import MIMICS, Mimic
 
+_FRAMES = "URDF holds no limbs, postures and servos; tips and soles are frames fixed to their links"
 FORMATS = (".toml", ".urdf", ".csv")
 
 
@@ -33,6 +35,17 @@ def convert(
     convention: Annotated[
         str, typer.Option(metavar="NAME", help="Of a DH file to write: modified or standard.")
     ] = "modified",
+    repair: Annotated[
+        bool,
+        typer.Option("--repair", help="Of a URDF to read: replace inertias that no body has by the nearest."),
+    ] = False,
+    mimic: Annotated[
+        str,
+        typer.Option(
+            metavar="HOW",
+            help="Coupled joints of a URDF to read: refuse them, or read them as free joints with a remark.",
+        ),
+    ] = "refuse",
     as_json: AsJson = False,
 ) -> int:
     """Convert a robot between screw tables (.toml), URDF (.urdf) and Denavit-Hartenberg tables (.csv).
@@ -40,10 +53,12 @@ def convert(
     What the target cannot hold is listed. Formulas and mirrored limbs are written out.
     """
     chosen = one_of("convention", convention, CONVENTIONS)
-    if target.suffix not in FORMATS:
+    suffix = target.suffix.lower()
+    if suffix not in FORMATS:
         raise InputError(f"cannot write {target}: OUT must end with {', '.join(FORMATS)}")
-    robot, remarks = _read(source)
-    text, lost = _written(robot, target.suffix, chosen)
+    coupled = one_of("way to read mimic", mimic, MIMICS)
+    robot, remarks = _read(source, repair, coupled)
+    text, lost = _written(robot, suffix, chosen)
     with atomic_write(target) as file:
         file.write(text)
     remarks += lost
@@ -53,16 +68,18 @@ def convert(
     else:
         print(f"{target}: {robot.name}, {len(robot.links)} links, {len(robot.joints)} joints")
         for text in remarks:
-            remark(text)
+            remark(f"remark: {text}")
     return 0
 
 
-def _read(source: str) -> tuple[Robot, list[str]]:
+def _read(source: str, repair: bool, mimic: Mimic) -> tuple[Robot, list[str]]:
     """The robot of a name or file, and remarks on what its format leaves open."""
-    suffix = Path(source).suffix
+    suffix = Path(source).suffix.lower()
     if suffix == ".urdf":
-        read = load_urdf(source)
+        read = load_urdf(source, repair, mimic)
         return read.robot, list(read.remarks)
+    if repair or mimic == "free":
+        raise InputError(f"--repair and --mimic are for a URDF that is read, and {source} is none; edit it")
     if suffix == ".csv":
         robot = robot_from_dh(load_dh(source), Path(source).stem, source)
         return robot, ["DH tables hold no masses, limits and soles: add those that the robot has"]
@@ -78,7 +95,7 @@ def _written(robot: Robot, suffix: str, convention: Convention) -> tuple[str, li
     }
     lost = {
         ".toml": [],
-        ".urdf": ["URDF holds no limbs, soles, postures and servos"] if robot.limbs else [],
+        ".urdf": [_FRAMES] if robot.limbs else [],
         ".csv": ["DH tables hold the chains' geometry only: no masses, limits, soles and closures"],
     }
     return writers[suffix](), lost[suffix]

@@ -5,11 +5,12 @@ from __future__ import annotations
 import json
 import math
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
-from screwkin.errors import MissingDependencyError
+from screwkin.errors import MissingDependencyError, RobotRemark
 
 T = TypeVar("T")
 
@@ -37,6 +38,23 @@ def plain(value: Any) -> Any:
 def remark(text: str) -> None:
     """A line for the reader that is no result."""
     print(text, file=sys.stderr, flush=True)
+
+
+@contextmanager
+def remarks_of_robots() -> Iterator[None]:
+    """What robots' files leave open, read inside, is a remark each and not a warning with a line of code."""
+    with warnings.catch_warnings():
+        shown = warnings.showwarning
+
+        def show(message: Warning | str, category: type[Warning], *place: Any, **rest: Any) -> None:
+            if issubclass(category, RobotRemark):
+                remark(f"remark: {message}")
+            else:
+                shown(message, category, *place, **rest)
+
+        warnings.simplefilter("always", RobotRemark)
+        warnings.showwarning = show
+        yield
 
 
 def drawn(draw: Callable[[], Sequence[T]]) -> Sequence[T]:

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from screwkin.errors import Fault
-from screwkin.model.records import Sole
+from screwkin.model.inertias import negative_moments
+from screwkin.model.records import Inertia, Sole
 from screwkin.model.rows import Rows
 from screwkin.model.schema import InertiaRow, JointRow, LinkRow, SoleRow
 
 _COMPONENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
-_RELATIVE = 1e-9  # of the greatest moment: rounding of nine written digits
 _FLAT = 1e-6  # m: far below what a floor is flat to
 
 
@@ -51,15 +51,9 @@ def _inertia(inertia: InertiaRow) -> Iterator[tuple[str, str, str]]:
     if absent:
         yield "inertia", f"{', '.join(absent)} missing", fix
         return
-    xx, yy, zz, xy, xz, yz = (float(getattr(inertia, name)) for name in _COMPONENTS)
-    a, b, c = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    moments = f"principal moments ({a:.6g}, {b:.6g}, {c:.6g})"
-    about = "Give the inertia about the CoM in base axes"
-    if a < -_RELATIVE * abs(c) or c < 0:
-        yield "inertia", f"{moments} are not all >= 0: no body has them", about
-    elif c > (a + b) * (1 + _RELATIVE):
-        found = f"{moments} break the triangle inequality: {c:.6g} > {a:.6g} + {b:.6g}, no body has them"
-        yield "inertia", found, about
+    found = negative_moments(Inertia(*(float(getattr(inertia, name)) for name in _COMPONENTS)))
+    if found:
+        yield "inertia", found, "Give the inertia about the CoM in base axes"
 
 
 def _joint(joint: JointRow) -> Iterator[tuple[str, str, str]]:

@@ -86,7 +86,7 @@ def _numbers_certified(robot: RobotRecord) -> bool:
         and bool(np.isfinite(_array([box.size for box in boxes])).all())
         and bool((np.abs(lengths - 1) < UNIT_TOLERANCE / 2).all())
         and _are_rotations(frames)
-        and are_inertias([link.inertia for link in robot.links])
+        and _are_inertias([link.inertia for link in robot.links])
         and all(_is_joint(joint) for joint in joints)
         and not any(True for sole in robot.soles for _ in sole_faults(sole))
         and all(
@@ -116,14 +116,13 @@ def _are_rotations(frames: Sequence[Pose]) -> bool:
     return bool((skewed < UNIT_TOLERANCE / 2).all() and (np.linalg.det(R) > 0).all())
 
 
-def are_inertias(inertias: Sequence[Inertia]) -> bool:
-    """Principal moments of which none is negative or larger than the sum of the others."""
+def _are_inertias(inertias: Sequence[Inertia]) -> bool:
+    """Principal moments of which none is negative."""
     moments = [(i.xx, i.xy, i.xz, i.xy, i.yy, i.yz, i.xz, i.yz, i.zz) for i in inertias]
     matrices = _floats(moments).reshape(-1, 3, 3)
     if not np.isfinite(matrices).all():
         return False
-    a, b, c = np.linalg.eigvalsh(matrices).T
-    return bool((a >= 0).all() and (c <= a + b).all())
+    return bool((np.linalg.eigvalsh(matrices) >= 0).all())
 
 
 def _is_joint(joint: Joint) -> bool:

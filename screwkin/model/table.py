@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 
-from screwkin.errors import InputError, TableError, expect
+from screwkin.errors import InputError, RobotRemark, TableError, expect
+from screwkin.model.inertias import broken_triangle
 from screwkin.model.library import find_robot
 from screwkin.model.robot import Robot
 from screwkin.model.toml import read_text
@@ -14,7 +16,8 @@ from screwkin.model.toml import read_text
 def load_robot(name_or_path: str | Path, symbolic: bool = False) -> Robot:
     """The robot of a bundled name, or of a file's path: ``.toml``, ``.urdf``, or a DH ``.csv``.
 
-    What a URDF file says and a table cannot is a warning; ``model.urdf_in.load_urdf`` returns these remarks.
+    What a URDF file says and a table cannot is a warning (``RobotRemark``), as is an inertia that breaks the
+    triangle inequality; ``model.urdf_in.load_urdf`` returns the remarks.
 
     Args:
         name_or_path: such as ``"linkages/four-bar"`` or ``"my/robot.toml"``.
@@ -72,15 +75,26 @@ parse_robot = Robot.from_text
 
 
 def _read(text: str, name: str, symbolic: bool) -> Robot:
-    """The robot of a text in TOML or XML; warns its caller's caller of what URDF leaves open."""
-    if not text.lstrip("\ufeff \t\r\n").startswith("<"):
-        return parse_robot(text, name, symbolic)
-    from screwkin.model.urdf_in import parse_urdf
+    """The robot of a text in TOML or XML; its remarks are warnings to its caller's caller."""
+    if text.lstrip("\ufeff \t\r\n").startswith("<"):
+        from screwkin.model.urdf_in import parse_urdf
 
-    _only_numbers(symbolic, name, "URDF")
-    read = parse_urdf(text, name)
-    warnings.warn(f"{name}: {'; '.join(read.remarks)}", stacklevel=3)
-    return read.robot
+        _only_numbers(symbolic, name, "URDF")
+        read = parse_urdf(text, name)
+        robot, remarks = read.robot, read.remarks
+    else:
+        robot = parse_robot(text, name, symbolic)
+        remarks = () if robot.is_symbolic else tuple(_inertia_remarks(robot))
+    for remark in remarks:
+        warnings.warn(f"{name}: {remark}", RobotRemark, stacklevel=3)
+    return robot
+
+
+def _inertia_remarks(robot: Robot) -> Iterator[str]:
+    """Links with inertias that no body can have, though every formula takes them."""
+    for link in robot.links:
+        if found := broken_triangle(link.inertia):
+            yield f"link {link.name}, key inertia: {found}. Give the inertia about the CoM in base axes"
 
 
 def _only_numbers(symbolic: bool, name: str, what: str) -> None:

@@ -1,9 +1,10 @@
 """A robot as URDF, for simulators and other libraries.
 
-Every URDF link frame is parallel to the base in the zero pose, with its origin at its joint's ``s0``: a URDF
-joint axis must pass through the origin of its child's frame, which a frame given in the table need not do.
-``urdf_frames`` says where these frames are, so that poses can be carried over. All other numbers are the
-table's own, shifted to that origin and written with every digit that distinguishes a float.
+A URDF joint axis must pass through the origin of its child's frame, which a frame given in the table need not
+do: every URDF link frame is turned as the table's, with its origin in the point of the joint's axis that is
+nearest to the table's. ``urdf_frames`` says where these frames are, so that poses can be carried over. All
+other numbers are the table's own, carried to that frame and written with every digit that distinguishes a
+float. Tips and soles are massless links fixed to their bodies.
 """
 
 from __future__ import annotations
@@ -12,9 +13,23 @@ import math
 from collections.abc import Mapping
 from xml.etree import ElementTree
 
-from screwkin.algebra.se3 import UNTURNED, ZERO, Pose, Vector
+from screwkin.algebra.scalar import Scalar
+from screwkin.algebra.se3 import (
+    UNTURNED,
+    ZERO,
+    Pose,
+    Rotation,
+    Vector,
+    as_array,
+    dot,
+    leaves,
+    vector_from_array,
+)
 from screwkin.errors import InputError
-from screwkin.model.robot import Box, Joint, Link, Robot
+from screwkin.model.inertias import inertia_from_matrix, inertia_matrix
+from screwkin.model.records import Box, Inertia, Joint, Link
+from screwkin.model.robot import Robot
+from screwkin.model.toml_out import rpy_of
 
 Colour = tuple[float, float, float, float]
 
@@ -22,6 +37,7 @@ WHITE: Colour = (0.93, 0.93, 0.94, 1.0)
 SLATE: Colour = (0.30, 0.36, 0.44, 1.0)
 ORANGE: Colour = (0.95, 0.50, 0.15, 1.0)
 _UNLIMITED = 1e9  # URDF readers parse no infinity
+_BOUNDS = {"boundmass": "1e-06", "boundinertia": "1e-09"}
 
 
 def urdf_frames(robot: Robot) -> Mapping[str, Pose]:
@@ -30,8 +46,34 @@ def urdf_frames(robot: Robot) -> Mapping[str, Pose]:
     A point p of a link's own frame is ``urdf_frames(robot)[name].inverse @ link.frame @ p`` in the URDF's.
     """
     frames = {robot.base_link: Pose(UNTURNED, ZERO)}
+    own = {link.name: link.frame for link in robot.links}
     for joint in robot.joints:
-        frames[joint.child] = Pose(UNTURNED, joint.screw.s0)
+        frame, screw = own[joint.child], joint.screw
+        if joint.type != "prismatic":
+            along = dot(screw.s, frame.p - screw.s0)
+            frame = Pose(frame.R, screw.s0 + screw.s * along)
+        frames[joint.child] = frame
+    return frames
+
+
+def tip_and_sole_frames(robot: Robot) -> Mapping[str, tuple[str, Pose]]:
+    """Link and zero pose of every frame that ``urdf_from_robot`` fixes to a link, by its name in the URDF.
+
+    A tip's frame is the limb's, under its name; a sole's, ``LIMB_sole``, lies in the middle of the corners
+    and is turned as the tip's. A name that a link has already ends in underscores.
+    """
+    frames: dict[str, tuple[str, Pose]] = {}
+    taken = set(robot.link_names)
+    tips = [(limb.tip, limb.link, limb.frame) for limb in robot.limbs]
+    for sole in robot.soles:
+        limb, corners = robot.limb(sole.limb), as_array(sole.corners)
+        middle = Pose(limb.frame.R, vector_from_array(corners.mean(axis=0)))
+        tips.append((f"{limb.name}_sole", limb.link, middle))
+    for name, link, pose in tips:
+        while name in taken:
+            name += "_"
+        taken.add(name)
+        frames[name] = (link, pose)
     return frames
 
 
@@ -46,10 +88,12 @@ def link_colours(robot: Robot) -> Mapping[str, Colour]:
 
 
 def urdf_from_robot(robot: Robot) -> str:
-    """The URDF text of a robot: inertia and boxes (collision and visual) on every link, limits, colours.
+    """The URDF text of a robot: its bodies and joints, and tips and soles as links fixed to their bodies.
 
-    Simulators need masses above zero on every link: give them ``robot.with_inertia_floor()``. Tips, soles and
-    postures have no place in URDF; a fixed base is the reader's choice.
+    Every link has an ``inertial``, massless ones of zeros, as PyBullet would take 1 kg for one without.
+    MuJoCo refuses massless links that move: an element that MuJoCo alone reads asks for 1 mg and 1e-9 kg m^2
+    there. For time steps write ``robot.with_inertia_floor()``. Limbs, postures and servos have no place in
+    URDF; a fixed base is the reader's choice.
 
     Args:
         robot: of numbers.
@@ -57,17 +101,37 @@ def urdf_from_robot(robot: Robot) -> str:
     Raises:
         InputError: the robot has helical joints or closures, which URDF cannot say; all are named.
     """
+    return _document(robot, tip_and_sole_frames(robot))
+
+
+def urdf_of_bodies(robot: Robot) -> str:
+    """The URDF text of a robot's links and joints alone, as ``urdf_from_robot`` writes them.
+
+    Args:
+        robot: of numbers.
+
+    Raises:
+        InputError: the robot has helical joints or closures, which URDF cannot say; all are named.
+    """
+    return _document(robot, {})
+
+
+def _document(robot: Robot, fixed: Mapping[str, tuple[str, Pose]]) -> str:
     _refuse_what_urdf_cannot_say(robot)
     root = ElementTree.Element("robot", name=robot.name)
     frames, colours = urdf_frames(robot), link_colours(robot)
     palette = {WHITE: "white", SLATE: "slate", ORANGE: "orange"}
+    if any(link.mass == 0 for link in robot.links if link.name != robot.base_link):
+        ElementTree.SubElement(ElementTree.SubElement(root, "mujoco"), "compiler", _BOUNDS)
     for colour in dict.fromkeys(colours.values()):
         material = ElementTree.SubElement(root, "material", name=palette[colour])
         ElementTree.SubElement(material, "color", rgba=" ".join(map(repr, colour)))
     for link in robot.links:
-        _add_link(root, link, frames[link.name].p, palette[colours[link.name]])
+        _add_link(root, link, frames[link.name], palette[colours[link.name]])
     for joint in robot.joints:
         _add_joint(root, joint, frames)
+    for name, (body, pose) in fixed.items():
+        _add_frame(root, name, body, frames[body].inverse @ pose)
     ElementTree.indent(root)
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
@@ -90,26 +154,40 @@ def _triple(v: Vector) -> str:
     return " ".join(_number(component) for component in v)
 
 
-def _add_origin(parent: ElementTree.Element, point: Vector) -> None:
-    ElementTree.SubElement(parent, "origin", xyz=_triple(point), rpy="0 0 0")
+def _add_origin(parent: ElementTree.Element, pose: Pose) -> None:
+    rpy = " ".join(map(_number, rpy_of(pose.R)))
+    ElementTree.SubElement(parent, "origin", xyz=_triple(pose.p), rpy=rpy)
 
 
-def _add_link(root: ElementTree.Element, link: Link, origin: Vector, material: str) -> None:
-    element = ElementTree.SubElement(root, "link", name=link.name)
-    inertial = ElementTree.SubElement(element, "inertial")
-    _add_origin(inertial, link.com - origin)
-    ElementTree.SubElement(inertial, "mass", value=_number(link.mass))
-    i = link.inertia
+def _add_inertial(link: ElementTree.Element, com: Vector, mass: Scalar, inertia: Inertia) -> None:
+    inertial = ElementTree.SubElement(link, "inertial")
+    _add_origin(inertial, Pose(UNTURNED, com))
+    ElementTree.SubElement(inertial, "mass", value=_number(mass))
+    i = inertia
     names = {"ixx": i.xx, "ixy": i.xy, "ixz": i.xz, "iyy": i.yy, "iyz": i.yz, "izz": i.zz}
     ElementTree.SubElement(inertial, "inertia", {name: _number(value) for name, value in names.items()})
+
+
+def _add_link(root: ElementTree.Element, link: Link, frame: Pose, material: str) -> None:
+    element = ElementTree.SubElement(root, "link", name=link.name)
+    back = frame.inverse
+    _add_inertial(element, back @ link.com, link.mass, _turned(link.inertia, back.R))
     for box in link.boxes:
-        ElementTree.SubElement(_add_box(element, "visual", box, origin), "material", name=material)
-        _add_box(element, "collision", box, origin)
+        ElementTree.SubElement(_add_box(element, "visual", box, back), "material", name=material)
+        _add_box(element, "collision", box, back)
 
 
-def _add_box(element: ElementTree.Element, kind: str, box: Box, origin: Vector) -> ElementTree.Element:
+def _turned(inertia: Inertia, R: Rotation) -> Inertia:
+    """The inertia in the axes to which R takes those of the base; unturned, the same numbers."""
+    if leaves(R) == leaves(UNTURNED):
+        return inertia
+    turn = as_array(R)
+    return inertia_from_matrix(turn @ inertia_matrix(inertia) @ turn.T)
+
+
+def _add_box(element: ElementTree.Element, kind: str, box: Box, back: Pose) -> ElementTree.Element:
     shape = ElementTree.SubElement(element, kind)
-    _add_origin(shape, box.center - origin)
+    _add_origin(shape, back @ Pose(UNTURNED, box.center))
     geometry = ElementTree.SubElement(shape, "geometry")
     ElementTree.SubElement(geometry, "box", size=_triple(box.size))
     return shape
@@ -118,13 +196,29 @@ def _add_box(element: ElementTree.Element, kind: str, box: Box, origin: Vector) 
 def _add_joint(root: ElementTree.Element, joint: Joint, frames: Mapping[str, Pose]) -> None:
     unlimited = math.isinf(joint.lower) and math.isinf(joint.upper) and joint.type == "revolute"
     kind = "continuous" if unlimited else joint.type
-    element = ElementTree.SubElement(root, "joint", name=joint.name, type=kind)
-    _add_origin(element, frames[joint.child].p - frames[joint.parent].p)
-    ElementTree.SubElement(element, "parent", link=joint.parent)
-    ElementTree.SubElement(element, "child", link=joint.child)
-    ElementTree.SubElement(element, "axis", xyz=_triple(joint.screw.s))
+    child = frames[joint.child]
+    element = _add_connection(
+        root, joint.name, kind, joint.parent, joint.child, frames[joint.parent].inverse @ child
+    )
+    ElementTree.SubElement(element, "axis", xyz=_triple(child.inverse.R @ joint.screw.s))
     limits = {"velocity": joint.velocity, "effort": joint.effort}
     if not unlimited:
         limits = {"lower": joint.lower, "upper": joint.upper, **limits}
     finite = {name: max(-_UNLIMITED, min(value, _UNLIMITED)) for name, value in limits.items()}
     ElementTree.SubElement(element, "limit", {name: _number(value) for name, value in finite.items()})
+
+
+def _add_frame(root: ElementTree.Element, name: str, link: str, place: Pose) -> None:
+    """A massless link at a place of another."""
+    _add_inertial(ElementTree.SubElement(root, "link", name=name), ZERO, 0, Inertia(0, 0, 0))
+    _add_connection(root, f"{name}_fixed", "fixed", link, name, place)
+
+
+def _add_connection(
+    root: ElementTree.Element, name: str, kind: str, parent: str, child: str, place: Pose
+) -> ElementTree.Element:
+    element = ElementTree.SubElement(root, "joint", name=name, type=kind)
+    _add_origin(element, place)
+    ElementTree.SubElement(element, "parent", link=parent)
+    ElementTree.SubElement(element, "child", link=child)
+    return element

@@ -17,18 +17,43 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.screws import INFINITE, Screw
-from screwkin.algebra.se3 import IDENTITY, Pose, Vector, as_array, vector_from_array
+from screwkin.algebra.se3 import IDENTITY, Pose, as_array, vector_from_array
 from screwkin.errors import TableError
+from screwkin.model.inertias import (
+    broken_triangle,
+    inertia_from_matrix,
+    inertia_matrix,
+    nearest_body,
+    negative_moments,
+    without_noise,
+)
 from screwkin.model.records import Box, Inertia, Joint, Link, RobotRecord
 from screwkin.model.robot import Robot
 from screwkin.model.toml import read_text
 from screwkin.model.toml_out import robot_toml
-from screwkin.model.urdf_xml import TYPES, Edge, Element, Reader, base_of, named, read_joints, read_root
+from screwkin.model.urdf_xml import (
+    TYPES,
+    Edge,
+    Element,
+    Mimic,
+    Reader,
+    base_of,
+    from_root,
+    named,
+    read_joints,
+    read_root,
+)
 
 _UNLIMITED = 1e9  # written by programs that have no word for infinity, this one among them
 _WHOLE = 1e-9  # how far a turned box may be from the base axes
-_KEPT = {"link", "joint", "material"}
+_KEPT = {
+    "robot": {"link", "joint", "material"},
+    "joint": {"origin", "parent", "child", "axis", "limit", "mimic"},
+}
 _NO_NAME = re.compile(r"[^A-Za-z0-9_-]+")
+_IMPOSSIBLE = "inertia read as it stands though no body has it (to repair: convert --repair)"
+_REPAIRED = "inertia that no body has, replaced by the nearest that one can have"
+_BOXES_ONLY = "left out, as only boxes along the axes stay for contact"
 
 
 @dataclass(frozen=True)
@@ -39,24 +64,30 @@ class UrdfRobot:
     remarks: tuple[str, ...]
 
 
-def load_urdf(path: str | Path) -> UrdfRobot:
+def load_urdf(path: str | Path, repair: bool = False, mimic: Mimic = "refuse") -> UrdfRobot:
     """The robot of a URDF file, with remarks on what a table cannot hold.
 
     Args:
         path: of the file.
+        repair: as of ``parse_urdf``.
+        mimic: as of ``parse_urdf``.
 
     Raises:
         TableError: the file cannot be read or has faults; it lists all of them.
     """
-    return parse_urdf(read_text(Path(path), TableError), str(path))
+    return parse_urdf(read_text(Path(path), TableError), str(path), repair, mimic)
 
 
-def parse_urdf(text: str, path: str = "<text>") -> UrdfRobot:
+def parse_urdf(text: str, path: str = "<text>", repair: bool = False, mimic: Mimic = "refuse") -> UrdfRobot:
     """The robot of a URDF text; its base is fixed if the root link is called ``world``, else floating.
 
     Args:
         text: XML.
         path: where it comes from, for messages and for ``Robot.path``.
+        repair: replace inertias that break the triangle inequality by the nearest that keep it, and say so
+            in the table's ``source``; else they stay as they stand, with a remark.
+        mimic: ``refuse`` coupled joints, which tables have no word for, or read them as ``free`` joints of
+            their own, with their coupling as a remark.
 
     Raises:
         TableError: the text has faults; it lists all of them.
@@ -64,21 +95,26 @@ def parse_urdf(text: str, path: str = "<text>") -> UrdfRobot:
     root = read_root(text, path)
     reader = Reader()
     links = dict(named(reader, root, "link"))
-    joints = list(read_joints(reader, root, links))
+    joints = list(read_joints(reader, root, links, mimic))
     base = base_of(reader, links, joints)
     if reader.faults:
         raise TableError(path, reader.faults)
-    left_out = sorted({child.tag for child in root if isinstance(child.tag, str)} - _KEPT)
-    if left_out:
-        reader.remarks.append(f"left out: {', '.join(left_out)}")
+    _note_left_out(reader, root, joints)
     names = _unique_names(reader, links)
-    bodies, moving = _bodies(reader, base, links, joints, names)
-    rows = [_joint(reader, edge, pose, parent, child) for edge, pose, parent, child in moving]
-    parts = [_link(body) for body in bodies]
+    bodies = _bodies(base, joints, names)
+    for name, element in links.items():
+        _add_mass(reader, bodies[name], name, element, repair)
+        _add_boxes(reader, bodies[name], name, element)
+    moving = [edge for edge in joints if edge.type != "fixed"]
+    rows = [_joint(reader, edge, bodies[edge.parent], bodies[edge.child]) for edge in moving]
+    whole = list({id(bodies[name]): bodies[name] for name in links}.values())
+    parts = [_link(body) for body in whole]
+    _audit_bodies(reader, whole, parts, base, names)
+    repaired = ", with repaired inertias" if _REPAIRED in reader.notes else ""
     robot = RobotRecord(
         name=_name(root.get("name", "") or "robot"),
         description="",
-        source=f"URDF {Path(path).name}",
+        source=f"URDF {Path(path).name}{repaired}",
         base="fixed" if base == "world" else "floating",
         base_link=names[base],
         links=tuple(parts),
@@ -86,55 +122,73 @@ def parse_urdf(text: str, path: str = "<text>") -> UrdfRobot:
     )
     if reader.faults:
         raise TableError(path, reader.faults)
-    reader.remarks.append("URDF names no limbs, soles and postures: add those that the robot has")
-    return UrdfRobot(Robot.from_text(robot_toml(robot), path), tuple(dict.fromkeys(reader.remarks)))
+    lost = "URDF names no limbs, soles and postures: add those that the robot has"
+    return UrdfRobot(Robot.from_text(robot_toml(robot), path), (*reader.remarks, lost))
+
+
+def _audit_bodies(
+    reader: Reader, bodies: Sequence[_Body], parts: Sequence[Link], base: str, names: Mapping[str, str]
+) -> None:
+    """Negative moments of a whole body are faults; moving without mass, and merged links, are remarks."""
+    for body, part in zip(bodies, parts, strict=True):
+        if found := negative_moments(part.inertia):
+            row = f"<link> {', '.join(map(repr, body.negative)) or repr(body.name)}"
+            fix = "Write moments about the CoM in the axes of <inertial>, or repair it: convert --repair"
+            reader.fault(row, "inertia", found, fix)
+        if len(body.poses) > 1:
+            merged = [name for name in body.poses if names[name] != body.name]
+            reader.note("merged, as fixed to one another", f"{' + '.join(merged)} into {body.name}")
+        if not part.mass and base not in body.poses:
+            reader.note("moves without mass, which simulators need (Robot.with_inertia_floor)", part.name)
+
+
+def _note_left_out(reader: Reader, root: Element, joints: Iterable[Edge]) -> None:
+    """Elements of the file and of its joints that a table has no place for."""
+    for kind, elements in (("robot", [root]), ("joint", [edge.element for edge in joints])):
+        tags = {str(child.tag) for element in elements for child in element}
+        for tag in sorted(tags - _KEPT[kind]):
+            reader.note("left out" if kind == "robot" else "left out of joints", tag)
 
 
 @dataclass
 class _Body:
-    """The links that fixed joints hold together: masses with CoM and inertia in base axes, and boxes."""
+    """Links that fixed joints hold together: their poses, masses with CoM and inertia in base axes, boxes.
+
+    ``negative`` lists those with negative moments of inertia.
+    """
 
     name: str
     frame: Pose
+    poses: dict[str, Pose]
     masses: list[tuple[float, Array, Array]] = field(default_factory=list)
+    negative: list[str] = field(default_factory=list)
     boxes: list[Box] = field(default_factory=list)
 
 
-def _bodies(
-    reader: Reader,
-    base: str,
-    links: Mapping[str, Element],
-    joints: Sequence[Edge],
-    names: Mapping[str, str],
-) -> tuple[list[_Body], list[tuple[Edge, Pose, str, str]]]:
-    """Bodies in the order of the file, and moving joints with their pose and the bodies that they connect."""
-    pose, body = {base: IDENTITY}, {base: _Body(names[base], IDENTITY)}
-    moving, left = [], list(joints)
-    while left:
-        edge = next(edge for edge in left if edge.parent in pose)
-        left.remove(edge)
-        pose[edge.child] = pose[edge.parent] @ edge.origin
+def _bodies(base: str, joints: Sequence[Edge], names: Mapping[str, str]) -> dict[str, _Body]:
+    """The body of every link of the file."""
+    body = {base: _Body(names[base], IDENTITY, {base: IDENTITY})}
+    for edge in from_root(base, joints):
+        pose = body[edge.parent].poses[edge.parent] @ edge.origin
         if edge.type == "fixed":
             body[edge.child] = body[edge.parent]
-            reader.remarks.append(f"link {edge.child} is fixed to {edge.parent}: merged into it")
+            body[edge.child].poses[edge.child] = pose
         else:
-            body[edge.child] = _Body(names[edge.child], pose[edge.child])
-            moving.append((edge, pose[edge.child], body[edge.parent].name, names[edge.child]))
-    for name, element in links.items():
-        _add_mass(reader, body[name], f"<link> {name!r}", element, pose[name])
-        _add_boxes(reader, body[name], name, element, pose[name])
-    return list({id(body[name]): body[name] for name in links}.values()), moving
+            body[edge.child] = _Body(names[edge.child], pose, {edge.child: pose})
+    return body
 
 
 def _unique_names(reader: Reader, links: Iterable[str]) -> dict[str, str]:
     """Names that a table allows, one for each link."""
     names: dict[str, str] = {}
+    taken = set[str]()
     for link in links:
         name = _name(link)
-        while name in names.values():
+        while name in taken:
             name += "_"
         if name != link:
-            reader.remarks.append(f"link {link!r} is called {name}")
+            reader.note("renamed, as a table needs plain names", f"{link!r} to {name}")
+        taken.add(name)
         names[link] = name
     return names
 
@@ -144,40 +198,51 @@ def _name(text: str) -> str:
     return name if name[:1].isalpha() or name[:1] == "_" else f"_{name}"
 
 
-def _add_mass(reader: Reader, body: _Body, row: str, link: Element, pose: Pose) -> None:
-    inertial = link.find("inertial")
+def _add_mass(reader: Reader, body: _Body, name: str, link: Element, repair: bool) -> None:
+    """The mass of one link of the file; its inertia as it stands, but for rounding."""
+    inertial, row = link.find("inertial"), f"<link> {name!r}"
     if inertial is None:
         return
     (mass,) = reader.numbers(row, inertial.find("mass"), "value", (0.0,))
-    here = pose @ reader.origin(row, inertial)
-    element = inertial.find("inertia")
+    here = body.poses[name] @ reader.origin(row, inertial)
     keys = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
-    xx, yy, zz, xy, xz, yz = (reader.numbers(row, element, key, (0.0,))[0] for key in keys)
+    moments = [reader.numbers(row, inertial.find("inertia"), key, (0.0,))[0] for key in keys]
     if mass < 0:
         reader.fault(row, "mass", f"{mass:g} is negative", "Write a mass >= 0 in kg")
-    if mass == 0 and any((xx, yy, zz)):
-        reader.remarks.append(f"{row} has inertia without mass: left out")
+    if mass == 0 and any(moments):
+        reader.note("inertia without mass", name)
+    inertia = _audited(reader, name, Inertia(*moments), mass, repair)
+    if mass > 0 and not inertia_matrix(inertia).any():
+        reader.note("mass without inertia, taken as a point", name)
+    if negative_moments(inertia):
+        body.negative.append(name)
     R = as_array(here.R)
-    inertia = R @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ R.T
-    body.masses.append((mass, as_array(here.p), inertia))
+    body.masses.append((mass, as_array(here.p), R @ inertia_matrix(inertia) @ R.T))
 
 
-def _add_boxes(reader: Reader, body: _Body, name: str, link: Element, pose: Pose) -> None:
+def _audited(reader: Reader, name: str, inertia: Inertia, mass: float, repair: bool) -> Inertia:
+    """An inertia without noise; what no body can have is a remark, or repaired."""
+    clean = without_noise(inertia, mass)
+    if clean is not inertia:
+        reader.note("moments of inertia as small as rounding, taken as 0", name)
+    if found := negative_moments(clean) or broken_triangle(clean):
+        reader.note(_REPAIRED if repair else _IMPOSSIBLE, f"{name} has {found}")
+        return nearest_body(clean) if repair else clean
+    return clean
+
+
+def _add_boxes(reader: Reader, body: _Body, name: str, link: Element) -> None:
     """Boxes of contact, or of pictures where there are none for contact."""
-    shapes = link.findall("collision") or link.findall("visual")
-    for shape in shapes:
-        row = f"<link> {name!r}"
+    row = f"<link> {name!r}"
+    for shape in link.findall("collision") or link.findall("visual"):
         geometry = shape.find("geometry")
-        solids = [] if geometry is None else [child for child in geometry if isinstance(child.tag, str)]
-        for solid in solids:
-            here = pose @ reader.origin(row, shape)
+        for solid in () if geometry is None else geometry:
+            here = body.poses[name] @ reader.origin(row, shape)
             turned = np.abs(as_array(here.R))
             whole = np.round(turned)
             if solid.tag != "box" or np.abs(turned - whole).max() > _WHOLE:
                 kind = "turned box" if solid.tag == "box" else solid.tag
-                reader.remarks.append(
-                    f"link {name}: a {kind} for contact is left out; only boxes along the axes stay"
-                )
+                reader.note(_BOXES_ONLY, f"{kind} of {name}")
                 continue
             size = whole @ np.array(reader.numbers(row, solid, "size", (0.0, 0.0, 0.0)))
             if (size <= 0).any():
@@ -189,49 +254,57 @@ def _add_boxes(reader: Reader, body: _Body, name: str, link: Element, pose: Pose
 def _link(body: _Body) -> Link:
     """One body of all its masses: Steiner's theorem about the common CoM."""
     mass = sum(m for m, _, _ in body.masses)
-    if not mass:
-        return Link(body.name, 0, body.frame.p, Inertia(0, 0, 0), body.frame, tuple(body.boxes))
-    com = np.sum([m * c for m, c, _ in body.masses], axis=0) / mass
+    com = as_array(body.frame.p)
+    if mass:
+        com = np.sum([m * c for m, c, _ in body.masses], axis=0) / mass
     total = np.zeros((3, 3))
     for m, c, inertia in body.masses:
         d = c - com
         total += inertia + m * (d @ d * np.eye(3) - np.outer(d, d))
-    moments = (total[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
-    boxes = tuple(body.boxes)
-    return Link(body.name, mass, vector_from_array(com), Inertia(*map(float, moments)), body.frame, boxes)
+    place = vector_from_array(com) if mass else body.frame.p
+    return Link(body.name, mass, place, inertia_from_matrix(total), body.frame, tuple(body.boxes))
 
 
-def _joint(reader: Reader, edge: Edge, pose: Pose, parent: str, child: str) -> Joint:
+def _joint(reader: Reader, edge: Edge, parent: _Body, child: _Body) -> Joint:
     """A moving joint; URDF's axis stands in the joint's own frame."""
-    row, kind = f"<joint> {edge.name!r}", TYPES[edge.type]
-    limit = edge.element.find("limit")
-    if limit is None and edge.type != "continuous":
-        reader.fault(
-            row, "limit", "is missing", 'Write <limit lower="..." upper="..." effort="..." velocity="..."/>'
-        )
-    lower, upper = -math.inf, math.inf
-    if edge.type != "continuous":
-        (lower,), (upper,) = (reader.numbers(row, limit, key, (0.0,)) for key in ("lower", "upper"))
+    kind = TYPES[edge.type]
+    lower, upper = _bounds(reader, edge)
     greatest = []
     for key in ("velocity", "effort"):
-        (value,) = reader.numbers(row, limit, key, (_UNLIMITED,))
+        (value,) = reader.numbers(_row(edge), edge.element.find("limit"), key, (_UNLIMITED,))
         if value <= 0:
-            reader.remarks.append(f"joint {edge.name}: {key} {value:g} is taken as no limit")
+            reader.note(f"{key} not above 0, taken as no limit", edge.name)
         greatest.append(value if 0 < value < _UNLIMITED else math.inf)
-    pitch = INFINITE if kind == "prismatic" else 0
-    return Joint(
-        _name(edge.name),
-        parent,
-        child,
-        kind,
-        Screw(_unit(pose, edge.axis), pose.p, pitch),
+    axis = as_array(child.frame.R @ edge.axis)
+    screw = Screw(
+        vector_from_array(axis / np.linalg.norm(axis)),
+        child.frame.p,
+        INFINITE if kind == "prismatic" else 0,
+    )
+    return Joint(_name(edge.name), parent.name, child.name, kind, screw, lower, upper, *greatest)
+
+
+def _row(edge: Edge) -> str:
+    return f"<joint> {edge.name!r}"
+
+
+def _bounds(reader: Reader, edge: Edge) -> tuple[float, float]:
+    """Limits of a joint; one alone has 0 for the other, as URDF defines, unless they then contradict."""
+    limit = edge.element.find("limit")
+    given = set() if limit is None else {"lower", "upper"} & set(limit.keys())
+    if edge.type == "continuous":
+        return -math.inf, math.inf
+    if not given:
+        reader.note("no lower and upper limit, read as free", edge.name)
+        return -math.inf, math.inf
+    (lower,), (upper,) = (reader.numbers(_row(edge), limit, key, (0.0,)) for key in ("lower", "upper"))
+    if len(given) == 1:
+        reader.note("one limit only, the other one read as 0, or as none beyond it", edge.name)
+        if lower > upper:
+            lower, upper = (lower, math.inf) if "lower" in given else (-math.inf, upper)
+    elif lower == upper:
+        reader.note("lower and upper limit are equal, so that it cannot move", edge.name)
+    return (
         lower if lower > -_UNLIMITED else -math.inf,
         upper if upper < _UNLIMITED else math.inf,
-        *greatest,
     )
-
-
-def _unit(pose: Pose, axis: Vector) -> Vector:
-    """The axis in base axes, of length 1 to the last digit that matters."""
-    s = as_array(pose.R @ axis)
-    return vector_from_array(s / np.linalg.norm(s))

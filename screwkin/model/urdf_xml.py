@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
+from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal, get_args
 
 from screwkin.algebra.scalar import structural
 from screwkin.algebra.se3 import Pose, Vector, X, Y, Z, rotate
@@ -13,6 +15,17 @@ from screwkin.errors import Fault, TableError
 from screwkin.model.records import JointType
 
 Element = Any
+Mimic = Literal["refuse", "free"]
+"""What becomes of joints that follow others."""
+MIMICS: tuple[Mimic, ...] = get_args(Mimic)
+
+_DECLARATION = re.compile(r"<\?xml\s[^<>]*\?>")
+_FIX = "Give a URDF file: XML with <robot> around <link> and <joint>"
+_FOREIGN: Mapping[str, str] = {
+    "sdf": "This is SDF, of Gazebo: give the URDF that it was made from",
+    "mujoco": "This is MJCF, of MuJoCo: give the URDF that it was made from",
+}
+_XACRO = "Run xacro first: xacro FILE.xacro > FILE.urdf (of ROS; or: python -m pip install xacro)"
 
 TYPES: Mapping[str, JointType] = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic"}
 """Joints of URDF that move, and what they are called here."""
@@ -20,10 +33,19 @@ TYPES: Mapping[str, JointType] = {"revolute": "revolute", "continuous": "revolut
 
 @dataclass
 class Reader:
-    """What is wrong with a file, and what is left out of it."""
+    """What is wrong with a file, and what is to be remarked: texts, each with the names that it is about."""
 
     faults: list[Fault] = field(default_factory=list)
-    remarks: list[str] = field(default_factory=list)
+    notes: dict[str, list[str]] = field(default_factory=dict)
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """The notes, one line for each."""
+        return tuple(f"{text}: {', '.join(dict.fromkeys(names))}" for text, names in self.notes.items())
+
+    def note(self, text: str, name: str) -> None:
+        """Note what a table cannot hold, or what the file leaves open."""
+        self.notes.setdefault(text, []).append(name)
 
     def fault(self, row: str, key: str, found: str, fix: str) -> None:
         """Note a fault; reading goes on."""
@@ -53,27 +75,50 @@ class Reader:
 
 
 def read_root(text: str, path: str) -> Element:
-    """The ``robot`` element of a text.
+    """The ``robot`` element of a text; a declaration is not needed, and may stand behind blanks or comments.
 
     Raises:
-        TableError: no XML, not URDF, or with entities and external references, which are never read.
+        TableError: no XML, not URDF, still xacro, or with entities and external references, which are never
+            read.
     """
     from defusedxml import DefusedXmlException
     from defusedxml.ElementTree import ParseError, fromstring
 
-    fix = "Give a URDF file: XML with <robot> around <link> and <joint>"
+    def refused(found: str, fix: str) -> TableError:
+        return TableError(path, [Fault("file", "", found, fix)])
+
+    bare = _DECLARATION.sub("", text.strip("\ufeff\0 \t\r\n"), count=1)
     try:
-        root = fromstring(text.encode())
+        root = fromstring(bare.encode())
     except ParseError as wrong:
-        raise TableError(path, [Fault("file", "", f"is no XML ({wrong})", fix)]) from None
+        if "<xacro:" in bare:
+            raise refused("holds xacro macros", _XACRO) from None
+        raise refused(f"is no XML ({wrong})", _FIX) from None
     except (DefusedXmlException, ValueError, LookupError) as wrong:
         found = f"holds what is never read ({type(wrong).__name__})"
-        raise TableError(
-            path, [Fault("file", "", found, "Remove entities and external references")]
-        ) from None
+        raise refused(found, "Remove entities and external references") from None
+    if _is_xacro(root):
+        raise refused("holds xacro macros", _XACRO)
+    _drop_namespace(root)
     if root.tag != "robot":
-        raise TableError(path, [Fault("file", "", f"begins with <{root.tag}>", fix)])
+        raise refused(f"begins with <{root.tag}>", _FOREIGN.get(root.tag, _FIX))
     return root
+
+
+def _is_xacro(root: Element) -> bool:
+    """Whether macros of xacro, or its expressions, are still to be expanded."""
+    return any(
+        "xacro" in str(element.tag).partition("}")[0]
+        or any("${" in value or "$(" in value for value in element.attrib.values())
+        for element in root.iter()
+    )
+
+
+def _drop_namespace(root: Element) -> None:
+    """URDF knows no namespaces: one that the root declares for all is none."""
+    space = root.tag.rpartition("}")[0]
+    for element in root.iter() if space else ():
+        element.tag = element.tag.removeprefix(f"{space}}}")
 
 
 def named(reader: Reader, root: Element, tag: str) -> Iterator[tuple[str, Element]]:
@@ -103,17 +148,15 @@ class Edge:
     element: Element
 
 
-def read_joints(reader: Reader, root: Element, links: Mapping[str, Element]) -> Iterator[Edge]:
+def read_joints(reader: Reader, root: Element, links: Mapping[str, Element], mimic: Mimic) -> Iterator[Edge]:
     """The joints, with all their faults."""
+    known = {element.get("name", "") for element in root.findall("joint")}
     for name, element in named(reader, root, "joint"):
         row, kind = f"<joint> {name!r}", element.get("type", "")
         if kind not in (*TYPES, "fixed"):
-            valid = ", ".join((*TYPES, "fixed"))
-            reader.fault(row, "type", f"is {kind!r}", f"Supported: {valid}")
-        if element.find("mimic") is not None:
-            reader.fault(
-                row, "mimic", "couples two joints", "Remove it, and couple them where they are driven"
-            )
+            reader.fault(row, "type", f"is {kind!r}", f"Supported: {', '.join((*TYPES, 'fixed'))}")
+        if kind != "fixed" and element.find("mimic") is not None:
+            _read_mimic(reader, name, element.find("mimic"), known, mimic)
         ends = []
         for key in ("parent", "child"):
             end = element.find(key)
@@ -122,18 +165,43 @@ def read_joints(reader: Reader, root: Element, links: Mapping[str, Element]) -> 
                 found = f"there is no link {link!r}" if link else "is missing"
                 reader.fault(row, key, found, f"Write <{key} link=...> with a link of the file")
             ends.append(link)
-        axis = reader.numbers(row, element.find("axis"), "xyz", (1.0, 0.0, 0.0))
-        length = math.hypot(*axis)
-        if length == 0:
-            reader.fault(row, "axis", "is the zero vector", "Write the direction of the joint's axis")
-            length = 1.0
-        unit = Vector(*(structural(c / length) for c in axis))
-        yield Edge(name, kind, ends[0], ends[1], reader.origin(row, element), unit, element)
+        axis = X if kind == "fixed" else _axis(reader, row, element)
+        yield Edge(name, kind, ends[0], ends[1], reader.origin(row, element), axis, element)
+
+
+def _read_mimic(reader: Reader, name: str, element: Element, known: set[str], mimic: Mimic) -> None:
+    """A coupling to another joint: a fault, or a remark that says it."""
+    row, leader = f"<joint> {name!r}", element.get("joint", "")
+    (factor,) = reader.numbers(row, element, "multiplier", (1.0,))
+    (offset,) = reader.numbers(row, element, "offset", (0.0,))
+    coupling = f"{name} = {factor:g} {leader} {offset + 0.0:+g}"
+    if leader not in known:
+        reader.fault(row, "mimic", f"there is no joint {leader!r}", "Name a joint of the file")
+    elif mimic == "refuse":
+        found = f"couples two joints, {coupling}, which tables cannot say"
+        fix = "Read it as a joint of its own, and keep the coupling where it is driven: convert --mimic free"
+        reader.fault(row, "mimic", found, fix)
+    else:
+        reader.note("coupled in the file, here joints of their own: drive them so", coupling)
+
+
+def _axis(reader: Reader, row: str, element: Element) -> Vector:
+    """The direction of a moving joint, in its own frame, as a unit vector."""
+    axis = reader.numbers(row, element.find("axis"), "xyz", (1.0, 0.0, 0.0))
+    greatest = max(map(abs, axis))
+    if greatest == 0:
+        reader.fault(row, "axis", "is the zero vector", "Write the direction of the joint's axis")
+        return X
+    length = greatest * math.hypot(*(c / greatest for c in axis))
+    return Vector(*(structural(c / length) for c in axis))
 
 
 def base_of(reader: Reader, links: Mapping[str, Element], joints: Sequence[Edge]) -> str:
     """The one link that no joint carries; faults where the links are no tree."""
     if reader.faults:
+        return ""
+    if not links:
+        reader.fault("file", "link", "holds no links", "Write a <link> for every body")
         return ""
     carried: dict[str, str] = {}
     for joint in joints:
@@ -146,10 +214,20 @@ def base_of(reader: Reader, links: Mapping[str, Element], joints: Sequence[Edge]
         found = f"roots: {', '.join(roots)}" if roots else "no root: the joints run in a circle"
         reader.fault("file", "link", found, "Connect all links to one tree")
         return ""
-    reached = {roots[0]}
-    for _ in joints:
-        reached |= {joint.child for joint in joints if joint.parent in reached}
+    reached = {roots[0], *(joint.child for joint in from_root(roots[0], joints))}
     lost = [name for name in links if name not in reached]
     if lost:
         reader.fault("file", "joint", f"{', '.join(lost)} run in a circle", "Connect all links to one tree")
     return roots[0]
+
+
+def from_root(root: str, joints: Sequence[Edge]) -> Iterator[Edge]:
+    """The joints that hang from a link, every one behind its parent's and brothers in the file's order."""
+    hung: dict[str, list[Edge]] = {}
+    for joint in joints:
+        hung.setdefault(joint.parent, []).append(joint)
+    ready = deque([root])
+    while ready:
+        for joint in hung.pop(ready.popleft(), ()):
+            ready.append(joint.child)
+            yield joint

@@ -28,7 +28,7 @@ from screwkin.algebra.se3 import as_array
 from screwkin.errors import InputError, MissingDependencyError
 from screwkin.model.robot import Limb, Robot
 from screwkin.model.state import State
-from screwkin.model.urdf import urdf_frames, urdf_from_robot
+from screwkin.model.urdf import urdf_frames, urdf_of_bodies
 from screwkin.sim.backend import Command, Contact, Observation, moment_about_origin
 from screwkin.sim.camera import Camera
 from screwkin.sim.drive import UNLIMITED, RigidServos, Servos
@@ -98,7 +98,7 @@ class PyBulletBackend:
         self.settings: Mapping[str, Any] = asdict(self._physics)
         _check_feet(robot)
         steadied, rotors = not isinstance(self._servos, MotorServos), self._servos.rotor_inertia
-        urdf = urdf_from_robot(with_rotors(robot.with_inertia_floor(), rotors, steadied))
+        urdf = urdf_of_bodies(with_rotors(robot.with_inertia_floor(), rotors, steadied))
         self._p = _imported_pybullet()
         self._client = _connected(self._p, gui)
         self._here = {"physicsClientId": self._client}
@@ -194,10 +194,12 @@ class PyBulletBackend:
         p.enableJointForceTorqueSensor(self._body, index, True, **self._here)
         info = p.getDynamicsInfo(self._body, index, **self._here)
         joint = robot.joints[robot.joint_above[limb.link]]
+        back = urdf_frames(robot)[limb.link].inverse
+        R_inertial_link = self._pose((0.0, 0.0, 0.0), info[4])[:3, :3].T
         return _Foot(
             index=index,
-            T_link_tip=as_array(urdf_frames(robot)[limb.link].inverse @ limb.frame),
-            axis_in_inertial=self._pose((0.0, 0.0, 0.0), info[4])[:3, :3].T @ as_array(joint.screw.s),
+            T_link_tip=as_array(back @ limb.frame),
+            axis_in_inertial=R_inertial_link @ as_array(back.R @ joint.screw.s),
             turns=joint.type == "revolute",
             mass=info[0],
         )

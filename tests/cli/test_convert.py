@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from screwkin.algebra.se3 import IDENTITY, as_array
+from screwkin.errors import RobotRemark
 from screwkin.kinematics.positions import link_displacements
 from screwkin.model.dh_csv import load_dh
 from screwkin.model.table import load_robot
@@ -65,6 +66,7 @@ def test_the_convention_of_a_dh_file_can_be_chosen(cli, tmp_path, convention):
         (["linkages/four-bar", "out.urdf"], "URDF has no closed loops"),
         (["none.urdf", "out.toml"], "cannot be read"),
         (["none.csv", "out.toml"], "cannot be read"),
+        (["poppy12", "out.toml", "--repair"], "are for a URDF that is read"),
         (["nobody", "out.toml"], "unknown robot 'nobody'"),
         (["poppy12", "no/such/folder/out.toml"], "no/such/folder"),
     ],
@@ -72,3 +74,30 @@ def test_the_convention_of_a_dh_file_can_be_chosen(cli, tmp_path, convention):
 def test_bad_input_is_told_once_and_writes_nothing(cli, refused, tmp_path, words, named):
     assert named in refused(cli("convert", *words), 2)
     assert not list(tmp_path.iterdir())
+
+
+IMPOSSIBLE = """<robot name="r"><link name="a"/><link name="b"><inertial><mass value="1"/>
+<inertia ixx="0.06" iyy="0.02" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="j" type="continuous"><parent link="a"/><child link="b"/></joint></robot>"""
+
+
+def test_impossible_inertias_are_kept_or_repaired_on_request(cli, tmp_path):
+    (tmp_path / "r.URDF").write_text(IMPOSSIBLE)
+    kept = cli("convert", "r.URDF", "kept.toml")
+    assert (kept.code, "though no body has it" in kept.err) == (0, True)
+    with pytest.warns(RobotRemark, match="triangle"):
+        assert load_robot(tmp_path / "kept.toml").link("b").inertia.xx == 0.06
+    assert cli("convert", "r.URDF", "repaired.toml", "--repair").code == 0
+    repaired = load_robot(tmp_path / "repaired.toml")
+    assert repaired.link("b").inertia.xx == pytest.approx(0.05)
+    assert repaired.source == "URDF r.URDF, with repaired inertias"
+
+
+def test_remarks_about_a_robot_are_lines_of_the_command_line(cli, tmp_path):
+    (tmp_path / "r.urdf").write_text(IMPOSSIBLE)
+    called = cli("info", "r.urdf", "--json")
+    assert called.code == 0
+    assert called.data["joints"]
+    lines = called.err.splitlines()
+    assert len(lines) >= 2
+    assert all(line.startswith("remark: r.urdf: ") for line in lines)

@@ -14,7 +14,7 @@ import screwkin as sk
 from screwkin.algebra.se3 import as_array
 from screwkin.compliance.stiffness import static_deflection
 from screwkin.model.robot import Robot
-from screwkin.model.urdf import urdf_from_robot
+from screwkin.model.urdf import urdf_of_bodies
 
 pb = pytest.importorskip("pybullet")
 
@@ -45,7 +45,7 @@ def rest_of_springs(client: int, robot: Robot, state: sk.State, foot: str, k, fo
     """
     link = robot.limb(foot).link
     path = folder / "robot.urdf"
-    path.write_text(urdf_from_robot(rooted_at(robot, link)), encoding="utf-8")
+    path.write_text(urdf_of_bodies(rooted_at(robot, link)), encoding="utf-8")
     stand = sk.frame_pose(robot, state, foot) @ np.linalg.inv(as_array(robot.limb(foot).frame))
     body = pb.loadURDF(
         str(path), useFixedBase=True, flags=pb.URDF_USE_INERTIA_FROM_FILE, physicsClientId=client

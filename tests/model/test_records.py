@@ -58,7 +58,7 @@ SAME = [
     ('parent = "trunk"', 'parent = "trnk"', ("joints", 0, {"parent": "trnk"})),
     ('child = "right_thigh"', 'child = "right_shin"', ("joints", 0, {"child": "right_shin"})),
     ('parent = "trunk"', 'parent = "right_shin"', ("joints", 0, {"parent": "right_shin"})),
-    ("xx = 0.002", "xx = 0.2", ("links", 1, {"xx": 0.2})),
+    ("xx = 0.002", "xx = -0.2", ("links", 1, {"xx": -0.2})),
     ('name = "right_leg"', 'name = "right leg"', ("limbs", 0, {"name": "right leg"})),
     ("base_height = 0.2", 'base_height = "1e999"', ("postures", 0, {"base_height": math.inf})),
     ("right_hip = 0.5", "right_hip = 2.5", ("postures", 0, {"q": (2.5, 0.0)})),

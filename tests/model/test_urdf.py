@@ -4,16 +4,24 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 from xml.etree import ElementTree
 
+import mujoco
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import screwkin as sk
 from screwkin.algebra.se3 import IDENTITY, as_array
+from screwkin.analysis.chains import derived_tables
 from screwkin.errors import InputError
+from screwkin.model.dh_robot import robot_from_dh
 from screwkin.model.robot import Closure, Robot
 from screwkin.model.urdf import link_colours, urdf_frames, urdf_from_robot
+from screwkin.model.urdf_in import parse_urdf
+from tests.kinematics.machines import random_tree
+from tests.oracles.simulated import poses_in_urdf_frames, random_sample, without_helical
 
 
 @pytest.fixture(scope="module")
@@ -32,8 +40,17 @@ def triple(element: ElementTree.Element | None, key: str) -> np.ndarray:
 
 
 def test_links_and_joints_keep_names_and_order(robot: Robot, root: ElementTree.Element) -> None:
-    assert tuple(link.attrib["name"] for link in root.findall("link")) == robot.link_names
-    assert tuple(joint.attrib["name"] for joint in root.findall("joint")) == robot.joint_names
+    """Behind the bodies come the frames of tips and soles, fixed to them."""
+    fixed = ("right_foot", "left_foot", "right_hand", "left_hand", "right_leg_sole", "left_leg_sole")
+    names = tuple(link.attrib["name"] for link in root.findall("link"))
+    assert names[: len(robot.links)] == robot.link_names
+    assert sorted(names[len(robot.links) :]) == sorted(fixed)
+    joints = root.findall("joint")
+    assert (
+        tuple(joint.attrib["name"] for joint in joints if joint.attrib["type"] != "fixed")
+        == robot.joint_names
+    )
+    assert len(joints) == len(robot.joints) + len(fixed)
     assert root.attrib["name"] == robot.name
 
 
@@ -54,7 +71,7 @@ def test_joint_origins_added_up_give_the_points_of_the_axes(robot: Robot, root: 
 
 
 def test_every_link_has_its_mass_and_inertia_to_the_last_bit(robot: Robot, root: ElementTree.Element) -> None:
-    for link, element in zip(robot.links, root.findall("link"), strict=True):
+    for link, element in zip(robot.links, root.findall("link"), strict=False):
         inertial = element.find("inertial")
         assert inertial is not None
         mass, inertia = inertial.find("mass"), inertial.find("inertia")
@@ -68,7 +85,7 @@ def test_every_link_has_its_mass_and_inertia_to_the_last_bit(robot: Robot, root:
 
 
 def test_boxes_are_seen_and_felt_where_the_table_puts_them(robot: Robot, root: ElementTree.Element) -> None:
-    for link, element in zip(robot.links, root.findall("link"), strict=True):
+    for link, element in zip(robot.links, root.findall("link"), strict=False):
         origin = as_array(urdf_frames(robot)[link.name].p)
         for kind in ("visual", "collision"):
             shapes = element.findall(kind)
@@ -80,7 +97,7 @@ def test_boxes_are_seen_and_felt_where_the_table_puts_them(robot: Robot, root: E
 
 
 def test_limits_are_the_tables(robot: Robot, root: ElementTree.Element) -> None:
-    for joint, element in zip(robot.joints, root.findall("joint"), strict=True):
+    for joint, element in zip(robot.joints, root.findall("joint"), strict=False):
         limit = element.find("limit")
         assert limit is not None
         for key in ("lower", "upper", "velocity", "effort"):
@@ -118,3 +135,84 @@ def test_what_urdf_cannot_say_is_refused_by_name(robot: Robot) -> None:
     loop = Closure("clasped_hands", robot.limbs[2].link, IDENTITY, robot.limbs[3].link, IDENTITY)
     with pytest.raises(InputError, match=r"no closed loops.*clasped_hands"):
         urdf_from_robot(replace(robot, closures=(loop,)))
+
+
+WRITTEN = ["bioloid", "poppy12", "dh", *(f"tree-{seed}" for seed in range(4))]
+
+
+def written(name: str) -> Robot:
+    """A bundled robot; its chains from DH tables, all massless; or a random tree with turned link frames."""
+    if name == "dh":
+        bioloid = sk.load_robot("bioloid")
+        return robot_from_dh(derived_tables(bioloid, "modified"), "dh")
+    return without_helical(random_tree(int(name[5:]))) if name.startswith("tree-") else sk.load_robot(name)
+
+
+@pytest.mark.parametrize("name", WRITTEN)
+def test_pinocchio_finds_every_frame_of_the_table_in_the_file(name: str) -> None:
+    """Tips where ``frame_pose`` has them; soles in the middle of their corners; links in ``urdf_frames``."""
+    robot = written(name)
+    model = pin.buildModelFromXML(urdf_from_robot(robot), pin.JointModelFreeFlyer())
+    data, sample = model.createData(), random_sample(robot).state
+    state = sk.State(np.eye(4), sample.q[0])
+    q = pin.neutral(model)
+    for joint_name, value in zip(robot.joint_names, state.q, strict=True):
+        joint = model.joints[model.getJointId(joint_name)]
+        wrapped = [value] if joint.nq == 1 else [np.cos(value), np.sin(value)]
+        q[joint.idx_q : joint.idx_q + joint.nq] = wrapped
+    pin.framesForwardKinematics(model, data, q)
+
+    def placed(frame: str) -> np.ndarray:
+        return np.array(data.oMf[model.getFrameId(frame, pin.FrameType.BODY)].homogeneous)
+
+    close = {"rtol": 0, "atol": 1e-12}
+    for tip in robot.tip_names:
+        np.testing.assert_allclose(placed(tip), sk.frame_pose(robot, state, tip), **close)
+    for sole in robot.soles:
+        limb = robot.limb(sole.limb)
+        middle = np.mean([as_array(corner) for corner in sole.corners], axis=0)
+        in_tip = np.linalg.inv(as_array(limb.frame)) @ [*middle, 1]
+        found = placed(f"{limb.name}_sole")
+        np.testing.assert_allclose(found[:3, 3], (placed(limb.tip) @ in_tip)[:3], **close)
+        np.testing.assert_allclose(found[:3, :3], placed(limb.tip)[:3, :3], **close)
+    for link, pose in zip(robot.links, poses_in_urdf_frames(robot, state), strict=True):
+        np.testing.assert_allclose(placed(link.name), pose, **close)
+
+
+@pytest.mark.parametrize("name", WRITTEN)
+def test_turned_frames_survive_the_way_through_urdf(name: str) -> None:
+    """A frame that is not on its joint's axis comes back nearest to where it was, and turned as it was."""
+    robot = written(name)
+    read = parse_urdf(urdf_from_robot(robot)).robot
+    again = parse_urdf(urdf_from_robot(read)).robot
+    for link, frame in urdf_frames(robot).items():
+        np.testing.assert_allclose(as_array(read.link(link).frame), as_array(frame), rtol=0, atol=1e-12)
+        np.testing.assert_allclose(as_array(again.link(link).frame), as_array(frame), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", WRITTEN)
+def test_mujoco_loads_what_is_written(name: str) -> None:
+    robot = written(name)
+    model = mujoco.MjModel.from_xml_string(urdf_from_robot(robot))
+    joints = [mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_JOINT, i) for i in range(model.njnt)]
+    assert sorted(joints) == sorted(robot.joint_names)
+
+
+@pytest.mark.parametrize("name", WRITTEN)
+def test_pybullet_loads_what_is_written_and_adds_no_mass(name: str, tmp_path: Path) -> None:
+    pb = pytest.importorskip("pybullet")
+    robot = written(name)
+    (tmp_path / "robot.urdf").write_text(urdf_from_robot(robot))
+    client = pb.connect(pb.DIRECT)
+    try:
+        flags = pb.URDF_USE_INERTIA_FROM_FILE
+        body = pb.loadURDF(str(tmp_path / "robot.urdf"), flags=flags, physicsClientId=client)
+        count = pb.getNumJoints(body, physicsClientId=client)
+        infos = [pb.getJointInfo(body, i, physicsClientId=client) for i in range(count)]
+        names = [info[1].decode() for info in infos if info[2] != pb.JOINT_FIXED]
+        masses = [pb.getDynamicsInfo(body, i, physicsClientId=client)[0] for i in range(-1, count)]
+    finally:
+        pb.disconnect(client)
+    assert sorted(names) == sorted(robot.joint_names)
+    assert {info[12].decode() for info in infos} >= set(robot.tip_names)
+    assert sum(masses) == pytest.approx(robot.mass, rel=1e-9, abs=1e-12)

@@ -1,0 +1,83 @@
+"""Which inertias bodies can have: moments that are not negative, none larger than the sum of the others.
+
+Negative moments are of no use to any formula and are refused. Moments that break the triangle inequality
+only are common in public models, harmless to kinematics and dynamics, and remarks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.scalar import Scalar
+from screwkin.model.records import Inertia
+
+_RELATIVE = 1e-9  # of the greatest moment: rounding of nine written digits
+_GYRATION = 1e-12  # m^2: a radius of gyration of a micrometre, squared
+
+
+def inertia_matrix(inertia: Inertia) -> Array:
+    """The inertia as a symmetric matrix (3, 3) [kg m^2]."""
+    xx, yy, zz, xy, xz, yz = _components(inertia)
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]], dtype=float)
+
+
+def inertia_from_matrix(matrix: Array) -> Inertia:
+    """The inertia of a symmetric matrix (3, 3) [kg m^2]."""
+    pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+    return Inertia(*(float(matrix[pair]) for pair in pairs))
+
+
+def negative_moments(inertia: Inertia) -> str:
+    """What is wrong with an inertia that has a negative principal moment beyond rounding; else nothing."""
+    a, b, c = np.linalg.eigvalsh(inertia_matrix(inertia))
+    if a < -_RELATIVE * abs(c) or c < 0:
+        return f"{_figures((a, b, c))} are not all >= 0: no body has them"
+    return ""
+
+
+def broken_triangle(inertia: Inertia) -> str:
+    """What is wrong with an inertia of which one principal moment exceeds the sum of the others."""
+    a, b, c = np.linalg.eigvalsh(inertia_matrix(inertia))
+    if c <= (a + b) * (1 + _RELATIVE):
+        return ""
+    return (
+        f"{_figures((a, b, c))} break the triangle inequality: {c:.6g} > {a:.6g} + {b:.6g}, no body has them"
+    )
+
+
+def without_noise(inertia: Inertia, mass: float) -> Inertia:
+    """The inertia with zero for what is rounding, else itself.
+
+    Rounding is a negative principal moment of what nine written digits leave, or an inertia of which every
+    radius of gyration is below a micrometre.
+    """
+    moments, axes = np.linalg.eigh(inertia_matrix(inertia))
+    least = _GYRATION * mass
+    if moments.any() and np.abs(moments).max() <= least:
+        return Inertia(0, 0, 0)
+    if -max(_RELATIVE * moments[2], least) <= moments[0] < 0:
+        return inertia_from_matrix((axes * np.maximum(moments, 0)) @ axes.T)
+    return inertia
+
+
+def nearest_body(inertia: Inertia) -> Inertia:
+    """The inertia near to an impossible one that a body can have, about the same principal axes.
+
+    Negative moments become 0. Of an excess over the triangle inequality one third is taken from the greatest
+    moment and added to each of the others: the least change. A possible inertia stays as it is.
+    """
+    moments, axes = np.linalg.eigh(inertia_matrix(inertia))
+    mended = np.maximum(moments, 0)
+    mended = mended + max(0, mended[2] - mended[0] - mended[1]) / 3 * np.array([1, 1, -1])
+    return inertia if (mended == moments).all() else inertia_from_matrix((axes * mended) @ axes.T)
+
+
+def _components(inertia: Inertia) -> Sequence[Scalar]:
+    return inertia.xx, inertia.yy, inertia.zz, inertia.xy, inertia.xz, inertia.yz
+
+
+def _figures(moments: Sequence[float]) -> str:
+    return f"principal moments ({', '.join(f'{m:.6g}' for m in moments)})"
