@@ -5,7 +5,6 @@ import pytest
 import screwkin as sk
 from screwkin.analysis.engines import SimulatedCompliance
 from screwkin.analysis.readiness import ready
-from screwkin.analysis.validate import validate
 from screwkin.compliance.springs import joint_stiffness
 from screwkin.errors import InputError, SafetyError, UnknownNameError
 from screwkin.gait.compensation import compensate, stiffness_of, way_of
@@ -25,7 +24,7 @@ def fast():
 @pytest.fixture(scope="module")
 def verdict(fast):
     pytest.importorskip("mujoco")
-    return validate(ROBOT, fast, "mujoco", compliance=TABLE)
+    return sk.validate(ROBOT, fast, "mujoco", servo="table")
 
 
 def test_the_torque_term_on_a_plan_is_a_warning_and_send_refuses_such_a_verdict(verdict, fast, tmp_path):
@@ -54,7 +53,7 @@ def test_the_verdict_says_how_commands_allow_for_the_servos(verdict, fast):
 def test_a_stiffness_wrong_by_a_third_is_survived(fast, factor):
     pytest.importorskip("mujoco")
     k = factor * joint_stiffness(ROBOT)[0]
-    check = validate(ROBOT, compensate(ROBOT, fast, k, model="dynamic"), "mujoco", compliance=TABLE)
+    check = sk.validate(ROBOT, compensate(ROBOT, fast, k, model="dynamic"), "mujoco", servo="table")
     assert not check.fell
     assert check.max_tilt_deg < 1.43  # 25 mrad
 
@@ -69,6 +68,6 @@ def test_commands_are_compensated_once_and_only_for_motors(fast):
 
 def test_unknown_models_and_two_kinds_of_servos_are_refused(fast):
     with pytest.raises(UnknownNameError, match="AX-12A"):
-        validate(ROBOT, fast, "mujoco", compliance=SimulatedCompliance(motors="HAL-9000"))
+        sk.validate(ROBOT, fast, "mujoco", servo="HAL-9000")
     with pytest.raises(InputError, match="choose one"):
-        SimulatedCompliance(Compliance(60.0), motors="table")
+        sk.validate(ROBOT, fast, "mujoco", servo="table", compliance=SimulatedCompliance(Compliance(60.0)))
