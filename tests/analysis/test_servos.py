@@ -1,13 +1,19 @@
 """Verdicts on real servos: what is played, what is recorded, and what is refused."""
 
+import json
+from dataclasses import replace
+
 import pytest
 
 import screwkin as sk
 from screwkin.analysis.engines import SimulatedCompliance
 from screwkin.analysis.readiness import ready
+from screwkin.analysis.validate import planned_facts
+from screwkin.analysis.verdict import bound_to, verdict_of
 from screwkin.compliance.springs import joint_stiffness
 from screwkin.errors import InputError, SafetyError, UnknownNameError
 from screwkin.gait.compensation import compensate, stiffness_of, way_of
+from screwkin.motors.library import load_motor, motor_text
 from screwkin.sim.compliant import Compliance
 from tests.verdicts import passing
 
@@ -33,6 +39,34 @@ def test_the_torque_term_on_a_plan_is_a_warning_and_send_refuses_such_a_verdict(
     path = passing(fast.save(tmp_path / "trajectory.npz"), servo="table", compensation=verdict.compensation)
     with pytest.raises(SafetyError, match="compensation is none, the verdict says dynamic"):
         ready(path)
+
+
+def test_a_servo_file_that_changed_since_is_refused(verdict, fast, tmp_path):
+    """The robot's table holds the name of such a file, not its figures; the verdict holds their hash."""
+    file = tmp_path / "mine.toml"
+    file.write_text(motor_text(load_motor("AX-12A")), encoding="utf-8")
+    commands = compensate(ROBOT, fast, model="dynamic")
+    own = replace(verdict, servo=str(file))
+    data = verdict_of(ROBOT, commands, replace(own, **planned_facts(ROBOT, commands), warnings=())).to_dict()
+    path = commands.save(tmp_path / "trajectory.npz")
+    (tmp_path / "validation.json").write_text(json.dumps(data), encoding="utf-8")
+    assert len(ready(path).verdict.motors_sha256) == 64
+    weaker = replace(load_motor("AX-12A"), motor=replace(load_motor("AX-12A").motor, constant=1.9))
+    file.write_text(motor_text(weaker), encoding="utf-8")
+    with pytest.raises(SafetyError, match="motors_sha256 is"):
+        ready(path)
+    file.unlink()
+    with pytest.raises(SafetyError, match=r"mine\.toml"):
+        ready(path)
+
+
+def test_verdicts_on_rigid_servos_hold_no_motors(fast):
+    assert (
+        bound_to(ROBOT, fast, "rigid")["motors_sha256"]
+        == bound_to(ROBOT, fast, "springs")["motors_sha256"]
+        == ""
+    )
+    assert bound_to(ROBOT, fast, "table") == bound_to(ROBOT, fast, "AX-12")
 
 
 def test_motors_with_the_torque_term_hardly_tilt(verdict):
