@@ -106,6 +106,7 @@ def validate(
     rule, report = criteria or Criteria(), progress or (lambda share: None)
     compliance = (compliance or SimulatedCompliance()).on(servo).for_trajectory(robot, trajectory)
     commands = motion or compliance.commands(robot, trajectory)
+    start = (motion or intended(robot, trajectory)).q[0]
     names = engines_for(engine, robot, compliance)
     ways = _FINER if check_solver and names != ("kinematic",) else {"usual": Refinement()}
     first = (0.2 if compliance.repeat else 1.0) / (len(names) * len(ways))
@@ -121,6 +122,7 @@ def validate(
                 backend,
                 rule.schedule,
                 lambda share: report(first * (done + share)),
+                start,
             )
         finally:
             backend.close()

@@ -3,6 +3,7 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import screwkin as sk
@@ -74,6 +75,13 @@ def test_motors_with_the_torque_term_hardly_tilt(verdict):
     assert verdict.servo == "table"
     assert verdict.max_tilt_deg < 0.57  # 10 mrad
     assert verdict.zmp_rms_mm < 6.0
+
+
+def test_walks_on_motors_start_in_the_posture_of_the_plan(verdict, fast):
+    """In that of the commands the soles would stand in the floor, which throws the robot up and turns it."""
+    first = verdict.run.foot_force[0].sum(axis=0)
+    assert np.abs(verdict.run.q[0] - fast.q[0]).max() < 1e-3
+    assert first[2] < 2.0 * 9.81 * ROBOT.mass
 
 
 def test_the_verdict_says_how_commands_allow_for_the_servos(verdict, fast):
