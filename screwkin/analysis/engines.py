@@ -89,11 +89,14 @@ class SimulatedCompliance:
         motors = self.motors_of(robot)
         if not motors or way_of(trajectory) != "none" or len(trajectory.feet) != 2:
             return trajectory
-        stiffness = {
-            name: float(motor.stiffness) for name, motor in zip(robot.joint_names, motors, strict=True)
-        }
+        stiffness, damping, armature = (
+            {name: float(getattr(m, what)) for name, m in zip(robot.joint_names, motors, strict=True)}
+            for what in ("stiffness", "damping", "armature")
+        )
         method, model = WAYS["dynamic"]
-        return compensate(robot, trajectory, stiffness, method, model=model)
+        return compensate(
+            robot, trajectory, stiffness, method, model=model, damping=damping, armature=armature
+        )
 
 
 def confirms(engine: str) -> bool:

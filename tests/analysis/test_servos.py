@@ -73,8 +73,9 @@ def test_verdicts_on_rigid_servos_hold_no_motors(fast):
 def test_motors_with_the_torque_term_hardly_tilt(verdict):
     assert verdict.passed, verdict.reasons
     assert verdict.servo == "table"
-    assert verdict.max_tilt_deg < 0.57  # 10 mrad
-    assert verdict.zmp_rms_mm < 6.0
+    assert verdict.max_tilt_deg < 0.2  # 3.5 mrad
+    assert verdict.min_margin_mm > 20.0
+    assert verdict.zmp_rms_mm < 2.0
 
 
 def test_walks_on_motors_start_in_the_posture_of_the_plan(verdict, fast):
