@@ -56,5 +56,5 @@ def passing_data(path: Path) -> dict[str, Any]:
         self_collisions=(),
         versions={},
         **planned,
-        **bound_to(robot, trajectory),
+        **bound_to(robot, trajectory, "rigid"),
     ).to_dict()

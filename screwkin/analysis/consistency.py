@@ -144,7 +144,8 @@ def _command_faults(robot: Robot, trajectory: Trajectory, motion: Trajectory) ->
         return
     entry = trajectory.meta["compensation"]
     choices = (entry[key] for key in ("method", "passes", "model"))
-    anew = compensate(robot, motion, stiffness_of(trajectory), *choices)
+    losses = {name: entry.get(name) for name in ("damping", "armature")}
+    anew = compensate(robot, motion, stiffness_of(trajectory), *choices, **losses)
     away = np.abs(anew.q - trajectory.q)
     if not away.max() <= SAME_COMMAND:
         k = int(away.max(axis=0).argmax())

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Literal, TypeVar
 
 from screwkin.compliance.springs import joint_stiffness
@@ -22,6 +23,8 @@ from screwkin.sim.pybullet import Physics, PyBulletBackend
 from screwkin.trajectory import Trajectory
 
 Engine = Literal["auto", "pybullet", "mujoco", "kinematic"]
+RIGID = "rigid"
+"""Servos that follow their commands exactly."""
 TABLE = "table"
 """The servos that a robot's table names."""
 ENGINES: tuple[Engine, ...] = ("auto", "pybullet", "mujoco", "kinematic")
@@ -53,6 +56,10 @@ class SimulatedCompliance:
         if self.motors is not None and self.servos is not None:
             raise InputError(f"servos are springs or motors ({self.motors}), not both; choose one")
 
+    def on(self, servo: str | Path) -> SimulatedCompliance:
+        """The same on servos of that name: ``rigid`` adds nothing, others are ``motors``."""
+        return self if servo == RIGID else replace(self, motors=str(servo))
+
     def for_trajectory(self, robot: Robot, trajectory: Trajectory) -> SimulatedCompliance:
         """The same with the stiffness of every joint by its name.
 
@@ -82,11 +89,14 @@ class SimulatedCompliance:
         motors = self.motors_of(robot)
         if not motors or way_of(trajectory) != "none" or len(trajectory.feet) != 2:
             return trajectory
-        stiffness = {
-            name: float(motor.stiffness) for name, motor in zip(robot.joint_names, motors, strict=True)
-        }
+        stiffness, damping, armature = (
+            {name: float(getattr(m, what)) for name, m in zip(robot.joint_names, motors, strict=True)}
+            for what in ("stiffness", "damping", "armature")
+        )
         method, model = WAYS["dynamic"]
-        return compensate(robot, trajectory, stiffness, method, model=model)
+        return compensate(
+            robot, trajectory, stiffness, method, model=model, damping=damping, armature=armature
+        )
 
 
 def confirms(engine: str) -> bool:

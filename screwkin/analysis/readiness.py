@@ -102,7 +102,7 @@ def _verdict_faults(robot: Robot, trajectory: Trajectory, verdict: Verdict) -> l
     """Fields of a verdict that are not those of robot and trajectory as they stand now."""
     try:
         with np.errstate(all="ignore"):  # what is not finite is not the same
-            anew = planned_facts(robot, trajectory) | bound_to(robot, trajectory)
+            anew = planned_facts(robot, trajectory) | bound_to(robot, trajectory, verdict.servo)
     except ScrewkinError as error:
         return [str(error)]
     faults = [

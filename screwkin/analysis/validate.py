@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.analysis.agreement import agreed, settled
 from screwkin.analysis.compliance import Conditions, StudyRow, Trial, repeated, summarised
-from screwkin.analysis.engines import Engine, Refinement, SimulatedCompliance, engines_for, opened
+from screwkin.analysis.engines import RIGID, Engine, Refinement, SimulatedCompliance, engines_for, opened
 from screwkin.analysis.verdict import Criteria, Measured, fallen_again, reasons_of
 from screwkin.errors import InputError
 from screwkin.files import text_sha256
@@ -58,6 +59,7 @@ def validate(
     trajectory: Trajectory,
     engine: Engine = "auto",
     *,
+    servo: str | Path = RIGID,
     gui: bool = False,
     camera: Camera | None = None,
     criteria: Criteria | None = None,
@@ -73,10 +75,13 @@ def validate(
         trajectory: what to play.
         engine: ``pybullet`` or ``mujoco`` (bodies, motors, contacts); ``auto``, all of them that are
             installed, which must agree; or ``kinematic`` (perfect tracking; never passes).
+        servo: ``rigid`` (commands are followed exactly), ``table`` (motors of the models that the robot's
+            table names), or the name or the file of a servo model, for all joints.
         gui: show a window, in real time.
         camera: take its pictures of what happens; they need neither display nor simulator.
         criteria: what a walk must satisfy.
-        compliance: of servos and soles; by default all are rigid. In repeated runs the robot may not fall.
+        compliance: of springs for servos, and of soles; by default all are rigid. In repeated runs the robot
+            may not fall.
         progress: called now and then with the share done.
         motion: what the joints do instead, as of servos that were measured; judged against the trajectory.
         check_solver: simulate at half the step and at twice the iterations too; a verdict that this changes,
@@ -86,7 +91,8 @@ def validate(
         Validation: ``passed``, ``reasons`` and what was measured.
 
     Raises:
-        InputError: unknown engine, a trajectory of another robot, or compliance that the engine has not.
+        InputError: unknown engine or servo, a trajectory of another robot, or compliance that the engine has
+            not.
         MissingDependencyError: the engine is not installed.
 
     Example:
@@ -98,8 +104,9 @@ def validate(
     """
     _check_fit(robot, trajectory)
     rule, report = criteria or Criteria(), progress or (lambda share: None)
-    compliance = (compliance or SimulatedCompliance()).for_trajectory(robot, trajectory)
+    compliance = (compliance or SimulatedCompliance()).on(servo).for_trajectory(robot, trajectory)
     commands = motion or compliance.commands(robot, trajectory)
+    start = (motion or intended(robot, trajectory)).q[0]
     names = engines_for(engine, robot, compliance)
     ways = _FINER if check_solver and names != ("kinematic",) else {"usual": Refinement()}
     first = (0.2 if compliance.repeat else 1.0) / (len(names) * len(ways))
@@ -115,6 +122,7 @@ def validate(
                 backend,
                 rule.schedule,
                 lambda share: report(first * (done + share)),
+                start,
             )
         finally:
             backend.close()

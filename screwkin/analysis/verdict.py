@@ -10,11 +10,13 @@ from typing import Any
 import numpy as np
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from screwkin.analysis.engines import PROVING, confirms
+from screwkin.analysis.engines import PROVING, SimulatedCompliance, confirms
 from screwkin.errors import InputError, ScrewkinError
 from screwkin.files import read_json, versions
 from screwkin.model.robot import Robot
+from screwkin.motors.library import motors_sha256
 from screwkin.servo.servo_map import ServoMap
+from screwkin.sim.compliant import SpringServos
 from screwkin.sim.measure import WINDOW
 from screwkin.sim.run import Schedule
 from screwkin.sim.self_collision import SelfCollision
@@ -109,10 +111,12 @@ class Verdict(Measured):
     """What ``validation.json`` holds: what was measured, and of what exactly.
 
     servo_map_sha256: of ids, directions, zeros and profiles of the servos, empty where the robot's table has
-    none; rate: samples of the trajectory per second [Hz]; versions: of the software.
+    none; motors_sha256: of the figures of the motors simulated, empty where none were; rate: samples of the
+    trajectory per second [Hz]; versions: of the software.
     """
 
     servo_map_sha256: str
+    motors_sha256: str
     rate: float
     versions: dict[str, str]
 
@@ -120,7 +124,7 @@ class Verdict(Measured):
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON data."""
-        bound = {"servo_map_sha256", "rate", "versions"}
+        bound = {"servo_map_sha256", "motors_sha256", "rate", "versions"}
         return super().to_dict() | {name: getattr(self, name) for name in sorted(bound)}
 
 
@@ -128,16 +132,22 @@ def verdict_of(robot: Robot, trajectory: Trajectory, check: Measured) -> Verdict
     """The verdict on a trajectory of that robot, bound to both and to the robot's servos."""
     return Verdict(
         **{f.name: getattr(check, f.name) for f in fields(Measured)},
-        **bound_to(robot, trajectory),
+        **bound_to(robot, trajectory, check.servo),
         versions={name: text for name, text in versions(*_TRACED).items() if text != "unknown"},
     )
 
 
-def bound_to(robot: Robot, trajectory: Trajectory) -> dict[str, Any]:
-    """Servo map and sampling rate: what ties a verdict to the bus that plays it."""
+def bound_to(robot: Robot, trajectory: Trajectory, servo: str) -> dict[str, Any]:
+    """Servo map, motors and sampling rate: what ties a verdict on such servos to the bus that plays it.
+
+    Raises:
+        InputError, UnknownNameError, TableError: servos of that name are motors without figures, or faulty.
+    """
     time = trajectory.time
+    motors = () if servo == SpringServos.name else SimulatedCompliance().on(servo).motors_of(robot)
     return {
         "servo_map_sha256": servo_map_sha256(robot),
+        "motors_sha256": motors_sha256(motors) if motors else "",
         "rate": float((len(time) - 1) / (time[-1] - time[0])),
     }
 

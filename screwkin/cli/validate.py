@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from screwkin.analysis.account import account_of, recorded_robot
-from screwkin.analysis.engines import SimulatedCompliance
+from screwkin.analysis.engines import RIGID, SimulatedCompliance
 from screwkin.analysis.verdict import verdict_of
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, TrajectoryPath
@@ -23,9 +23,6 @@ from screwkin.files import make_folder
 from screwkin.report.numbers import validation_numbers
 from screwkin.sim.compliant import Compliance
 from screwkin.trajectory import load_trajectory
-
-RIGID = "rigid"
-"""Servos that follow their commands exactly."""
 
 
 def validate(
@@ -131,8 +128,7 @@ def _compliance(
     """The compliance that a command line asks for."""
     if not compliant and (repeat or k is not None):
         raise InputError(f"{'--repeat' if repeat else '--stiffness'} is of elastic servos; add --compliant")
-    springs, motors = Compliance(k) if compliant else None, None if servo == RIGID else servo
-    return SimulatedCompliance(springs, sole_stiffness, repeat, motors)
+    return SimulatedCompliance(Compliance(k) if compliant else None, sole_stiffness, repeat).on(servo)
 
 
 def _changes(engine: str, compliance: SimulatedCompliance, k: float | None) -> list[str]:

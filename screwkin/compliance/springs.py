@@ -1,8 +1,8 @@
-"""The stiffness of elastic joints, from the table or from the caller, checked."""
+"""The stiffness of elastic joints and what their motors take, from the table or from the caller, checked."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -29,24 +29,65 @@ def joint_stiffness(robot: Robot, stiffness: StiffnessChoice = None) -> Array:
         UnknownNameError: no such joint.
     """
     chosen: Any = robot.servos.get("stiffness") if stiffness is None else stiffness
-    if chosen is None and names_motors(robot):
+    if _of_motors(robot, stiffness):
         return np.array([motor.stiffness for motor in motors_of(robot)], dtype=float)
     if chosen is None:
         raise InputError(
             f"{robot.name} has no joint stiffness; give one in N m/rad, or write stiffness under [servos] "
             f"of its table, or a model of servo that is known: {', '.join(motor_models())}"
         )
+    return _by_joint(robot, "stiffness", chosen, "a positive number in N m/rad", lambda k: k > 0)
+
+
+def drive_losses(
+    robot: Robot,
+    stiffness: StiffnessChoice = None,
+    damping: StiffnessChoice = None,
+    armature: StiffnessChoice = None,
+) -> tuple[Array, Array]:
+    """Damping (n,) [N m s/rad] and rotor inertia (n,) [kg m^2] of every joint's servo.
+
+    They take a share of the torque of servos that move. Each is given as a stiffness is. None stands for the
+    figures of the table's servo models where the stiffness is theirs too, else for 0: a spring has none.
+
+    Raises:
+        InputError: a joint has none, or one is no finite number of at least 0.
+        UnknownNameError: no such joint.
+    """
+    if damping is None and armature is None and _of_motors(robot, stiffness):
+        motors = motors_of(robot)
+        return np.array([m.damping for m in motors]), np.array([m.armature for m in motors])
+    d, inertia = (
+        _by_joint(
+            robot, what, 0.0 if chosen is None else chosen, f"a number of at least 0 {unit}", _not_negative
+        )
+        for what, chosen, unit in (("damping", damping, "N m s/rad"), ("armature", armature, "kg m^2"))
+    )
+    return d, inertia
+
+
+def _of_motors(robot: Robot, stiffness: StiffnessChoice) -> bool:
+    """Whether the stiffness of the joints follows from the table's servo models."""
+    return stiffness is None and robot.servos.get("stiffness") is None and names_motors(robot)
+
+
+def _not_negative(value: float) -> bool:
+    return value >= 0
+
+
+def _by_joint(robot: Robot, what: str, chosen: Any, expected: str, valid: Callable[[float], bool]) -> Array:
+    """The numbers (n,) of a choice, every one of them checked."""
     by_name = chosen if isinstance(chosen, Mapping) else {"default": chosen}
     for name in by_name:
         if name != "default" and name not in robot.joint_names:
             raise UnknownNameError("joint", name, robot.joint_names)
-    for name, k in by_name.items():
-        number = isinstance(k, int | float | np.number) and not isinstance(k, bool)
-        if not (number and np.isfinite(k) and k > 0):
+    for name, value in by_name.items():
+        number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+        if not (number and np.isfinite(value) and valid(value)):
             where = "" if name == "default" else f" of {name}"
-            raise InputError(f"stiffness{where} is {k!r}; it must be a positive number in N m/rad")
+            raise InputError(f"{what}{where} is {value!r}; it must be {expected}")
     missing = [name for name in robot.joint_names if name not in by_name and "default" not in by_name]
     if missing:
-        raise InputError(f"no stiffness for {', '.join(missing)}; name them, or give a default")
+        raise InputError(f"no {what} for {', '.join(missing)}; name them, or give a default")
     every = {**dict.fromkeys(robot.joint_names, by_name.get("default")), **by_name}
     return np.array([every[name] for name in robot.joint_names], dtype=float)

@@ -10,7 +10,9 @@ remedies, both computed before the walk:
   deflections of standing on either foot are blended by the load distribution, so that no command jumps.
 
 In statics the robot stands still on a foot that its CoM is not above, and the ankle must hold it; in a walk
-the ZMP is there. The model ``dynamic`` takes the torques of the walk itself and is free of that error.
+the ZMP is there. The model ``dynamic`` takes the torques tau of the walk itself and is free of that error. It
+also allows for what a motor that moves takes of its own torque: with d = kt^2 / R of the back-EMF and viscous
+friction, and a rotor of inertia A, the command is q + (tau + d qd + A qdd) / k.
 
 Source: paper B, section 5, algorithm of four steps (``swing``); docs/papers.md.
 """
@@ -27,7 +29,7 @@ from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, pose_from_array, unstack
-from screwkin.compliance.springs import StiffnessChoice, joint_stiffness
+from screwkin.compliance.springs import StiffnessChoice, drive_losses, joint_stiffness
 from screwkin.compliance.stiffness import Deflection, static_deflection
 from screwkin.compliance.stiffness import Method as StaticModel
 from screwkin.errors import InputError, LimitError, NoSolutionError
@@ -62,6 +64,8 @@ def compensate(
     method: Method = "joint",
     passes: int = 1,
     model: Model = "nonlinear",
+    damping: StiffnessChoice = None,
+    armature: StiffnessChoice = None,
 ) -> Trajectory:
     """The trajectory with commands that allow for the servos' deflection under the robot's weight.
 
@@ -74,25 +78,38 @@ def compensate(
         model: how deflections are predicted. For ``joint``, ``linear`` takes the torques of the planned
             posture; the compensated robot stands in it, so that the first pass is exact already. ``dynamic``,
             for ``joint`` only, takes those of the planned motion, and needs no further pass either.
+        damping: what speed takes of the servos' torque, for ``dynamic``; see ``drive_losses``.
+        armature: inertia of their rotors, likewise.
 
     Returns:
         Trajectory with the commanded ``q`` and ``qd``; all other fields stay those of the planned motion.
-        ``meta["compensation"]`` holds method, model, passes and stiffness.
+        ``meta["compensation"]`` holds method, model, passes and stiffness, for ``dynamic`` also damping and
+        armature.
 
     Raises:
         NoSolutionError: the joints are too soft for the robot's weight. UnreachableError, SingularError,
         LimitError: a compensated target or joint is out of reach. InputError: a choice is wrong, or the
         trajectory is not one of this robot's walks.
     """
+    if model != "dynamic" and not (damping is None and armature is None):
+        raise InputError(f"damping and armature are of model 'dynamic', not of {model!r}")
     k = joint_stiffness(robot, stiffness)
+    figures = {"stiffness": k}
     *_, last = _commands(robot, trajectory, stiffness, method, passes, model)
+    if model == "dynamic":
+        d, inertia = drive_losses(robot, stiffness, damping, armature)
+        last = last + (d * trajectory.qd + inertia * trajectory.qdd) / k
+        figures |= {"damping": d, "armature": inertia}
     q = trajectory.q + last
     _check_limits(robot, trajectory, q)
     choices = {
         "method": method,
         "model": model,
         "passes": int(passes),
-        "stiffness": dict(zip(robot.joint_names, k.tolist(), strict=True)),
+        **{
+            what: dict(zip(robot.joint_names, values.tolist(), strict=True))
+            for what, values in figures.items()
+        },
     }
     qd = trajectory.qd + change_rates(trajectory.time, last)
     return replace(trajectory, q=q, qd=qd, meta={**trajectory.meta, "compensation": choices})

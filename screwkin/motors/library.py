@@ -17,10 +17,11 @@ constant = [0.3, 0.5]
 
 from __future__ import annotations
 
+import json
 import math
 import tomllib
-from collections.abc import Iterator, Mapping
-from dataclasses import MISSING, fields, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import MISSING, asdict, fields, replace
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -28,6 +29,7 @@ from types import MappingProxyType
 from typing import Any
 
 from screwkin.errors import Fault, InputError, TableError, UnknownNameError
+from screwkin.files import text_sha256
 from screwkin.model.robot import Robot
 from screwkin.motors.records import Friction, Motor, MotorModel
 
@@ -107,6 +109,11 @@ def motors_named(robot: Robot, name: str) -> tuple[Motor, ...]:
         UnknownNameError, TableError: see ``load_motor``.
     """
     return (_with_supply(load_motor(name, table_folder(robot)).motor, robot.servos),) * len(robot.joints)
+
+
+def motors_sha256(motors: Sequence[Motor]) -> str:
+    """SHA-256 of all figures of motors, in their order."""
+    return text_sha256(json.dumps([asdict(motor) for motor in motors], sort_keys=True))
 
 
 def motor_text(model: MotorModel) -> str:

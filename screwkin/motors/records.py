@@ -89,6 +89,11 @@ class Motor:
         """Torque per error in the steady state [N m/rad], below the limits and beyond the dead zone."""
         return self.gain * self.kp * self.voltage * self.constant / self.resistance
 
+    @property
+    def damping(self) -> Any:
+        """Torque per speed [N m s/rad] that back-EMF and viscous friction take."""
+        return self.constant**2 / self.resistance + self.friction.viscous
+
 
 @dataclass(frozen=True)
 class MotorModel:

@@ -73,6 +73,7 @@ def simulate(
     backend: Backend,
     schedule: Schedule | None = None,
     progress: Callable[[float], None] | None = None,
+    start: Array | None = None,
 ) -> Run:
     """Play a trajectory in a backend, which stays open.
 
@@ -85,15 +86,17 @@ def simulate(
         backend: where to play it.
         schedule: settling, holding and when a fall is a fall.
         progress: called now and then with the share done, 0 to 1.
+        start: positions (n,) of the joints at first, by default the first commands. Commands that allow for
+            elastic servos are no posture: in them feet would stand in the floor, which throws the robot up.
     """
     rule = schedule or Schedule()
-    dt, start = backend.dt, float(trajectory.time[0])
+    dt, since = backend.dt, float(trajectory.time[0])
     count = round((rule.settle + trajectory.duration + rule.hold) / dt)
-    times: Array = start - rule.settle + dt * np.arange(count + 1, dtype=np.float64)
+    times: Array = since - rule.settle + dt * np.arange(count + 1, dtype=np.float64)
     q, _ = trajectory.sampled(times)
     planned = trajectory.base_sampled(times)
     qd = np.diff(q, axis=0) / dt
-    backend.reset(State(planned[0], q[0]))
+    backend.reset(State(planned[0], q[0] if start is None else start))
     seen: list[Observation] = []
     fallen_at: float | None = None
     for k in range(count):

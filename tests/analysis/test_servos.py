@@ -1,14 +1,20 @@
 """Verdicts on real servos: what is played, what is recorded, and what is refused."""
 
+import json
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 import screwkin as sk
 from screwkin.analysis.engines import SimulatedCompliance
 from screwkin.analysis.readiness import ready
-from screwkin.analysis.validate import validate
+from screwkin.analysis.validate import planned_facts
+from screwkin.analysis.verdict import bound_to, verdict_of
 from screwkin.compliance.springs import joint_stiffness
 from screwkin.errors import InputError, SafetyError, UnknownNameError
 from screwkin.gait.compensation import compensate, stiffness_of, way_of
+from screwkin.motors.library import load_motor, motor_text
 from screwkin.sim.compliant import Compliance
 from tests.verdicts import passing
 
@@ -25,7 +31,7 @@ def fast():
 @pytest.fixture(scope="module")
 def verdict(fast):
     pytest.importorskip("mujoco")
-    return validate(ROBOT, fast, "mujoco", compliance=TABLE)
+    return sk.validate(ROBOT, fast, "mujoco", servo="table")
 
 
 def test_the_torque_term_on_a_plan_is_a_warning_and_send_refuses_such_a_verdict(verdict, fast, tmp_path):
@@ -36,11 +42,47 @@ def test_the_torque_term_on_a_plan_is_a_warning_and_send_refuses_such_a_verdict(
         ready(path)
 
 
+def test_a_servo_file_that_changed_since_is_refused(verdict, fast, tmp_path):
+    """The robot's table holds the name of such a file, not its figures; the verdict holds their hash."""
+    file = tmp_path / "mine.toml"
+    file.write_text(motor_text(load_motor("AX-12A")), encoding="utf-8")
+    commands = compensate(ROBOT, fast, model="dynamic")
+    own = replace(verdict, servo=str(file))
+    data = verdict_of(ROBOT, commands, replace(own, **planned_facts(ROBOT, commands), warnings=())).to_dict()
+    path = commands.save(tmp_path / "trajectory.npz")
+    (tmp_path / "validation.json").write_text(json.dumps(data), encoding="utf-8")
+    assert len(ready(path).verdict.motors_sha256) == 64
+    weaker = replace(load_motor("AX-12A"), motor=replace(load_motor("AX-12A").motor, constant=1.9))
+    file.write_text(motor_text(weaker), encoding="utf-8")
+    with pytest.raises(SafetyError, match="motors_sha256 is"):
+        ready(path)
+    file.unlink()
+    with pytest.raises(SafetyError, match=r"mine\.toml"):
+        ready(path)
+
+
+def test_verdicts_on_rigid_servos_hold_no_motors(fast):
+    assert (
+        bound_to(ROBOT, fast, "rigid")["motors_sha256"]
+        == bound_to(ROBOT, fast, "springs")["motors_sha256"]
+        == ""
+    )
+    assert bound_to(ROBOT, fast, "table") == bound_to(ROBOT, fast, "AX-12")
+
+
 def test_motors_with_the_torque_term_hardly_tilt(verdict):
     assert verdict.passed, verdict.reasons
     assert verdict.servo == "table"
-    assert verdict.max_tilt_deg < 0.57  # 10 mrad
-    assert verdict.zmp_rms_mm < 6.0
+    assert verdict.max_tilt_deg < 0.2  # 3.5 mrad
+    assert verdict.min_margin_mm > 20.0
+    assert verdict.zmp_rms_mm < 2.0
+
+
+def test_walks_on_motors_start_in_the_posture_of_the_plan(verdict, fast):
+    """In that of the commands the soles would stand in the floor, which throws the robot up and turns it."""
+    first = verdict.run.foot_force[0].sum(axis=0)
+    assert np.abs(verdict.run.q[0] - fast.q[0]).max() < 1e-3
+    assert first[2] < 2.0 * 9.81 * ROBOT.mass
 
 
 def test_the_verdict_says_how_commands_allow_for_the_servos(verdict, fast):
@@ -54,7 +96,7 @@ def test_the_verdict_says_how_commands_allow_for_the_servos(verdict, fast):
 def test_a_stiffness_wrong_by_a_third_is_survived(fast, factor):
     pytest.importorskip("mujoco")
     k = factor * joint_stiffness(ROBOT)[0]
-    check = validate(ROBOT, compensate(ROBOT, fast, k, model="dynamic"), "mujoco", compliance=TABLE)
+    check = sk.validate(ROBOT, compensate(ROBOT, fast, k, model="dynamic"), "mujoco", servo="table")
     assert not check.fell
     assert check.max_tilt_deg < 1.43  # 25 mrad
 
@@ -69,6 +111,6 @@ def test_commands_are_compensated_once_and_only_for_motors(fast):
 
 def test_unknown_models_and_two_kinds_of_servos_are_refused(fast):
     with pytest.raises(UnknownNameError, match="AX-12A"):
-        validate(ROBOT, fast, "mujoco", compliance=SimulatedCompliance(motors="HAL-9000"))
+        sk.validate(ROBOT, fast, "mujoco", servo="HAL-9000")
     with pytest.raises(InputError, match="choose one"):
-        SimulatedCompliance(Compliance(60.0), motors="table")
+        sk.validate(ROBOT, fast, "mujoco", servo="table", compliance=SimulatedCompliance(Compliance(60.0)))

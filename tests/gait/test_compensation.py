@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import screwkin as sk
+from screwkin.analysis.consistency import motion_faults
 from screwkin.compliance.stiffness import static_deflection
 from screwkin.errors import InputError, LimitError, NoSolutionError, UnknownNameError
 from screwkin.gait.compensation import compensate, convergence
@@ -141,6 +142,30 @@ def test_rates_belong_to_the_commands(robot: sk.Robot, walked: sk.Trajectory) ->
     change, rate = commanded.q - walked.q, commanded.qd - walked.qd
     slope = (change[2:] - change[:-2]) / (walked.time[2:] - walked.time[:-2])[:, None]
     assert np.abs(slope - rate[1:-1]).mean() < 0.05 * np.abs(rate).max()
+
+
+def test_commands_of_motors_add_what_back_emf_and_rotors_take(robot: sk.Robot, walked: sk.Trajectory) -> None:
+    spring = compensate(robot, walked, K, model="dynamic")
+    motor = compensate(robot, walked, K, model="dynamic", damping={"default": 0.3}, armature=0.005)
+    taken = 0.3 * walked.qd + 0.005 * walked.qdd
+    np.testing.assert_allclose(K * (motor.q - spring.q), taken, rtol=0, atol=1e-12)
+    assert set(motor.meta["compensation"]["damping"].values()) == {0.3}
+    assert set(spring.meta["compensation"]["armature"].values()) == {0.0}
+    assert motion_faults(robot, motor) == motion_faults(robot, spring) == ()
+    with pytest.raises(InputError, match=r"damping of left_knee is -1\.0; it must be a number of at least 0"):
+        compensate(robot, walked, K, model="dynamic", damping={"default": 0.3, "left_knee": -1.0})
+    with pytest.raises(InputError, match="are of model 'dynamic', not of 'linear'"):
+        compensate(robot, walked, K, model="linear", damping=0.3)
+
+
+def test_a_servo_model_of_the_table_gives_its_motors_figures_unless_a_stiffness_is_given() -> None:
+    """AX-12A: 2 N m/A through 16 ohm brake with 4 / 16 N m s/rad."""
+    robot = sk.load_robot("bioloid")
+    walked = sk.walk(robot, sk.load_gait("smooth"), steps=1)
+    of_table, spring = (compensate(robot, walked, k, model="dynamic").meta["compensation"] for k in (None, K))
+    assert set(of_table["damping"].values()) == {0.25}
+    assert set(of_table["armature"].values()) == {0.005}
+    assert set(spring["damping"].values()) == {0.0}
 
 
 def test_a_hundred_times_stiffer_needs_a_hundredth(robot: sk.Robot, walked: sk.Trajectory) -> None:

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from screwkin.motors.law import drive, duty, friction_budget, load_torque, motor_torque, stopping_torque
-from screwkin.motors.pendulum import Pendulum, delayed, swing
+from screwkin.motors.pendulum import STEP, Pendulum, delayed, swing
 from screwkin.motors.records import Friction, Motor, stacked
 
 MOTOR = Motor(constant=2.0, resistance=16.0, voltage=12.0, armature=0.005, gain=26.6667)
@@ -87,6 +87,21 @@ def test_a_free_pendulum_swings_as_its_differential_equation_says():
         atol=1e-10,
     )
     assert angles[-1] == pytest.approx(true.y[0, -1], abs=1e-3)
+
+
+def test_a_command_that_allows_for_load_back_emf_and_rotor_is_followed():
+    """Of a mass swung at 4 rad/s; with the load's torque alone it lags by the back-EMF over the stiffness."""
+    motor, mass = MOTOR, Pendulum.of_mass(0.3, 0.1)
+    time = STEP * np.arange(3000)
+    q, qd, qdd = 0.5 * np.sin(4 * time), 2 * np.cos(4 * time), -8 * np.sin(4 * time)
+    load = mass.inertia * qdd + mass.weight * np.sin(q)
+    taken = motor.damping * qd + motor.armature * qdd
+    away = [
+        np.abs(swing(motor, mass, q + torque / motor.stiffness, q[0], qd[0])[500:-1] - q[500:]).max()
+        for torque in (load + taken, load)
+    ]
+    assert away[0] < 0.02 * away[1]
+    assert away[1] == pytest.approx(motor.damping * 2 / motor.stiffness, rel=0.1)
 
 
 def test_stacked_motors_drive_their_joints_as_each_would_alone():

@@ -36,9 +36,11 @@ class Scripted:
     settings: dict[str, object] = field(default_factory=dict)
     dt: float = 0.01
     commands: list[Command] = field(default_factory=list)
+    start: sk.State | None = None
 
     def reset(self, state: sk.State) -> Observation:
         self.commands.clear()
+        self.start = state
         return self.observe()
 
     def step(self, command: Command) -> None:
@@ -96,6 +98,17 @@ def test_a_fall_by_tilt_or_height_is_seen_and_watched_to_its_end(
     assert run.fallen_at == pytest.approx(0.2)
     assert run.time[-1] == pytest.approx(0.4)
     assert len(run.time) == len(run.q) == len(run.ground_wrench) == 90
+
+
+def test_a_run_starts_in_the_first_commands_or_in_the_posture_it_is_given(
+    robot: Robot, walk: Trajectory
+) -> None:
+    scripted, posture = Scripted([tilted(0, 0.15)], len(robot.joints)), walk.q[0] + 0.01
+    for given, expected in ((None, walk.q[0]), (posture, posture)):
+        simulate(robot, walk, scripted, start=given)
+        assert scripted.start is not None
+        assert np.allclose(scripted.start.q, expected, rtol=0, atol=1e-12)
+        assert np.allclose(scripted.commands[0].q, walk.q[0], rtol=0, atol=1e-12)
 
 
 def test_contacts_are_summed_by_foot_and_others_are_named(robot: Robot, walk: Trajectory) -> None:
