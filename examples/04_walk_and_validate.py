@@ -1,4 +1,4 @@
-"""Walk: from a gait file to a ZMP on paper, then the same ZMP from contact forces in PyBullet."""
+"""Walk: from a gait file to a ZMP on paper, then the same ZMP from contact forces in simulation."""
 
 import numpy as np
 
@@ -17,7 +17,7 @@ def main(steps: int = 4) -> float:
     print(f"a cart-table would misplace the ZMP by up to {off:.1f} mm")
 
     verdict = sk.validate(robot, walk)
-    print(f"PyBullet: {'passed' if verdict.passed else 'failed: ' + '; '.join(verdict.reasons)}")
+    print(f"{verdict.engine}: {'passed' if verdict.passed else 'failed: ' + '; '.join(verdict.reasons)}")
     result = verdict.to_dict()
     print(f"ZMP from contact forces against the plan: {result['zmp_max_mm']} mm at most")
     return float(np.max(result["zmp_max_mm"]))

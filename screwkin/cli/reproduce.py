@@ -20,6 +20,7 @@ from screwkin.papers.bench import Bench
 from screwkin.papers.claims import load_paper
 from screwkin.papers.reproduce import Reproduction, check_paper
 from screwkin.papers.reproduce import reproduce as measured
+from screwkin.papers.scatter import FEW
 
 _TRACED = ("screwkin", "numpy", "scipy", "pybullet")
 
@@ -28,6 +29,9 @@ def reproduce(
     name: Annotated[
         str, typer.Argument(metavar="NAME", help="A bundled paper's name, or the path of such a file.")
     ],
+    runs: Annotated[
+        int, typer.Option(min=1, help="How often to simulate what rounding decides; the pages take 20.")
+    ] = FEW,
     plots: Annotated[bool, typer.Option(help="Draw the figures and write the pages.")] = True,
     output: OutputFolder = None,
     as_json: AsJson = False,
@@ -42,7 +46,7 @@ def reproduce(
         from screwkin.papers.page import check_pictures
 
         check_pictures(paper)
-    bench = Bench(paper.robot, paper.changes)
+    bench = Bench(paper.robot, paper.changes, runs)
     with output_folder(output, "reproduce", paper.name) as folder:
         with progress_bar("measuring") as done:
             result = measured(paper, bench, done)
@@ -52,7 +56,7 @@ def reproduce(
                 json.dumps(plain({"rows": rows}), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
             )
         if plots:
-            _draw(result, bench, folder, _command(name, output))
+            _draw(result, bench, folder, _command(name, runs, output))
     if as_json:
         print_json({"paper": paper.name, "rows": rows, "folder": str(folder)})
     else:
@@ -72,9 +76,11 @@ def _draw(result: Reproduction, bench: Bench, folder: Path, command: str) -> Non
     write_pages(result, pictures, folder, command, _versions())
 
 
-def _command(name: str, output: Path | None) -> str:
+def _command(name: str, runs: int, output: Path | None) -> str:
     """The command line that writes the same pages again."""
-    return shlex.join(["screwkin", "reproduce", name, *([] if output is None else ["-o", str(output)])])
+    repeated = [] if runs == FEW else ["--runs", str(runs)]
+    folder = [] if output is None else ["-o", str(output)]
+    return shlex.join(["screwkin", "reproduce", name, *repeated, *folder])
 
 
 def _versions() -> str:
@@ -100,4 +106,4 @@ def _text(result: Reproduction) -> str:
     differing = [f"  {line.item}: {line.note}" for line in result.lines if line.agrees is False]
     if differing:
         parts += ["", "where they differ", *differing]
-    return "\n".join([*parts, "", result.summary])
+    return "\n".join([*parts, "", result.summary, *filter(None, [result.repetition])])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -15,6 +15,7 @@ from screwkin.gait.files import load_gait
 from screwkin.gait.record import Gait
 from screwkin.gait.walk import walk
 from screwkin.model.table import load_robot
+from screwkin.papers.scatter import FEW, scattered, shaken
 
 T = TypeVar("T")
 
@@ -24,11 +25,12 @@ Changes = Mapping[str, str | float]
 class Bench:
     """What measures share.
 
-    ``robot`` is the paper's; ``changes`` apply to every gait.
+    ``robot`` is the paper's; ``changes`` apply to every gait; ``runs``: how often a simulation that scatters
+    is run.
     """
 
-    def __init__(self, robot: str, changes: Changes | None = None) -> None:
-        self.robot = load_robot(robot)
+    def __init__(self, robot: str, changes: Changes | None = None, runs: int = FEW) -> None:
+        self.robot, self.runs = load_robot(robot), runs
         self._changes = dict(changes or {})
         self._results: dict[tuple[object, ...], Any] = {}
 
@@ -60,6 +62,31 @@ class Bench:
         trajectory, compliance = account.trajectory, SimulatedCompliance(sole_stiffness=sole_stiffness)
         key = ("validation", trajectory.sha256, sole_stiffness)
         return self.once(key, lambda: validate(account.robot, trajectory, "pybullet", compliance=compliance))
+
+    def verdicts(self, account: Account, sole_stiffness: float | None = None) -> tuple[dict[str, Any], ...]:
+        """The verdicts of runs of a walk that differ by rounding; the first is that of ``validation``."""
+        compliance = SimulatedCompliance(sole_stiffness=sole_stiffness)
+
+        def verdict(run: int) -> dict[str, Any]:
+            if not run:
+                return self.validation(account, sole_stiffness).to_dict()
+            trajectory = shaken(account.trajectory, run)
+            return validate(account.robot, trajectory, "pybullet", compliance=compliance).to_dict()
+
+        key = ("verdicts", account.trajectory.sha256, sole_stiffness)
+        return self.once(
+            key, lambda: self.repeated(verdict, self.runs, lambda one: (one["fell_at"], one["zmp_max_mm"]))
+        )
+
+    @staticmethod
+    def repeated(
+        simulated: Callable[[int], T], runs: int, numbers: Callable[[T], Sequence[float | None]]
+    ) -> tuple[T, ...]:
+        """Results of runs 0, 1, ...: ``runs`` of them, or ``FEW`` if their ``numbers`` do not scatter."""
+        results: list[T] = []
+        while len(results) < runs and (len(results) != FEW or scattered([numbers(one) for one in results])):
+            results.append(simulated(len(results)))
+        return tuple(results)
 
     @cached_property
     def comparison(self) -> Comparison:

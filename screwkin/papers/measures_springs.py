@@ -2,25 +2,53 @@
 
 from __future__ import annotations
 
-from screwkin.analysis.compliance import TREATMENTS, Conditions, StudyRow, Trial, compliance_study
+from screwkin.analysis.account import Account
+from screwkin.analysis.compliance import (
+    TREATMENTS,
+    Conditions,
+    StudyRow,
+    Treatment,
+    Trial,
+    compliance_study,
+    summarised,
+)
 from screwkin.errors import one_of
 from screwkin.papers.bench import Bench
+from screwkin.papers.scatter import FEW, Scatter, shaken
 
 FRICTIONS = (0.8, 1.0)
-KEYS = ("x", "y", "cut x", "cut y", "fallen", "runs", "range x", "range y")
+KEYS = ("x", "y", "cut x", "cut y", "fallen")
 
 
 def row_of(bench: Bench, gait: str, treatment: str, stiffness: float) -> StudyRow:
     """The runs of a treatment, together with those without any."""
     account = bench.account(gait)
     one_of("treatment", treatment, TREATMENTS)
-    conditions = Conditions(frictions=FRICTIONS, steps=Conditions().steps[:1])
     key = ("springs", account.trajectory.sha256, stiffness, *FRICTIONS)
     rows = bench.once(
         key,
-        lambda: compliance_study(account.robot, account.trajectory, stiffness, conditions=conditions),
+        lambda: summarised(
+            [trial for one in TREATMENTS for trial in _trials(bench, account, one, stiffness)]
+        ),
     )
     return next(row for row in rows if row.treatment == treatment)
+
+
+def _trials(bench: Bench, account: Account, treatment: Treatment, stiffness: float) -> list[Trial]:
+    """Runs of a treatment that differ by friction and rounding."""
+    conditions = Conditions(frictions=FRICTIONS, steps=Conditions().steps[:1])
+
+    def pair(run: int) -> tuple[Trial, ...]:
+        walk = shaken(account.trajectory, run)
+        (row,) = compliance_study(account.robot, walk, stiffness, (treatment,), conditions)
+        return row.trials
+
+    def numbers(trials: tuple[Trial, ...]) -> list[float | None]:
+        return [number for trial in trials for number in (trial.fell_at, *trial.zmp_max_mm)]
+
+    pairs = min(FEW, -(-bench.runs // len(FRICTIONS)))  # a study of all treatments takes minutes
+    repeated = bench.repeated(pair, pairs, numbers)
+    return [trial for trials in repeated for trial in trials]
 
 
 def trial_of(bench: Bench, gait: str, treatment: str, stiffness: float) -> Trial:
@@ -29,24 +57,20 @@ def trial_of(bench: Bench, gait: str, treatment: str, stiffness: float) -> Trial
     return max(trials, key=lambda trial: trial.friction)
 
 
-def on_springs(
-    bench: Bench, gait: str, treatment: str, key: str, stiffness: float
-) -> float | str | list[float]:
-    """Median over the runs of the largest ZMP error ``x`` or ``y`` [m], or how many fell.
+def on_springs(bench: Bench, gait: str, treatment: str, key: str, stiffness: float) -> float | str | Scatter:
+    """Largest ZMP error ``x`` or ``y`` [m] of the runs that stand, or how many fell.
 
-    ``cut`` is the share by which the median is below that without compensation, ``range`` the least and the
-    greatest. Runs that fall have no largest error: if all do, the measure says so.
+    ``cut`` is the share by which the median is below that without compensation. Runs that fall have no
+    largest error: if all do, the measure says so.
     """
     one_of("number of walks on springs", key, KEYS)
     row = row_of(bench, gait, treatment, stiffness)
     what, _, axis = key.rpartition(" ")
     k = 0 if axis == "x" else 1
-    if key in ("fallen", "runs"):
-        return row.fallen if key == "fallen" else row.runs
-    if row.median_mm is None or row.range_mm is None:
+    if key == "fallen":
+        return f"{row.fallen} of {row.runs}"
+    if row.fallen == row.runs:
         return f"all {row.runs} runs fall"
-    if what == "range":
-        return [1e-3 * value for value in row.range_mm[k]]
     if what == "cut":
         return row.cut[k] if row.cut is not None else "none completes without it"
-    return 1e-3 * row.median_mm[k]
+    return Scatter(tuple(1e-3 * one.zmp_max_mm[k] for one in row.trials if one.fell_at is None))

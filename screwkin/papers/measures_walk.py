@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.analysis.account import Account
 from screwkin.errors import InputError, one_of
 from screwkin.papers.bench import Bench
+from screwkin.papers.scatter import Scatter
 
 Changes = Mapping[str, str | float] | None
 
@@ -99,13 +101,18 @@ def simulated(
     steps: int | None = None,
     changes: Changes = None,
     sole_stiffness: float | None = None,
-) -> float | str:
-    """What the simulator says of a walk; lengths as in the verdict, truth as yes or no.
+) -> Scatter:
+    """What the simulator says of runs of a walk; lengths as in the verdict, truth as yes or no.
 
     Soles are rigid unless ``sole_stiffness`` [N/m] of every point of contact is given.
     """
     account = bench.account(gait, steps, changes)
-    verdict = bench.validation(account, sole_stiffness).to_dict()
+    verdicts = bench.verdicts(account, sole_stiffness)
+    return Scatter(tuple(_single(verdict, key) for verdict in verdicts))
+
+
+def _single(verdict: Mapping[str, Any], key: str) -> float | str:
+    """One value of a verdict."""
     if key == "fell_at" and verdict[key] is None:
         return "does not fall"
     if key not in verdict or isinstance(verdict[key], dict | list | None):

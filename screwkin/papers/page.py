@@ -116,7 +116,7 @@ def write_pages(
 
 def _markdown(result: Reproduction, pictures: Sequence[Sequence[Drawn]], command: str, versions: str) -> str:
     paper = result.paper
-    parts = [f"# {paper.title}", f"*{paper.source}*", paper.text, result.summary]
+    parts = [f"# {paper.title}", f"*{paper.source}*", paper.text, result.summary, result.repetition]
     parts += [f"Made by\n\n```\n{command}\n```\n\nwith {versions}."]
     for measured, drawn in zip(result.sections, pictures, strict=True):
         parts += [f"## {measured.title}", measured.section.text]
@@ -142,6 +142,7 @@ def _html(result: Reproduction, pictures: Sequence[Sequence[Drawn]], command: st
         f'<p class="soft">{_text(paper.source)}</p>',
         f"<p>{_text(paper.text)}</p>",
         f'<div class="verdict good"><strong>{_text(result.summary)}</strong></div>',
+        f'<p class="soft">{_text(result.repetition)}</p>',
         f"<pre>{escape(command)}</pre>",
         f'<p class="soft">{escape(versions)}</p>',
     ]

@@ -12,6 +12,7 @@ from screwkin.errors import MissingDependencyError
 from screwkin.papers.bench import Bench
 from screwkin.papers.claims import UNITS, Claim, Paper, Section, Value
 from screwkin.papers.measures import MEASURES, check_call
+from screwkin.papers.scatter import ALIKE, FEW, ROUNDING, Scatter
 
 MARKS = {True: "same", False: "differs", None: ""}
 """How a row's agreement is written."""
@@ -30,6 +31,8 @@ class ClaimResult:
         note: where and why they differ, or how ours is meant.
         agrees: whether they are equal, within what the row allows; None if they cannot be compared.
         form: how ours is written.
+        span: least and greatest of runs that differ by rounding, of which ours is the median.
+        runs: how many; None if nothing was simulated.
     """
 
     item: str
@@ -38,6 +41,26 @@ class ClaimResult:
     note: str
     agrees: bool | None
     form: str = ""
+    span: tuple[float, float] | None = None
+    runs: int | None = None
+
+    @property
+    def shown(self) -> str:
+        """Ours for a page, with the range of its runs if the digits show it."""
+        ours = written(self.ours, self.form) or "–"
+        return f"{ours} ({' to '.join(self._ends)})" if len(set(self._ends)) > 1 else ours
+
+    @property
+    def remark(self) -> str:
+        """The note, and how many runs there were."""
+        if self.runs is None:
+            return self.note
+        below = ", range below the digits shown" if len(set(self._ends)) == 1 and self.runs > 1 else ""
+        return f"{self.note} {self.runs} run{'s' * (self.runs > 1)}{below}.".lstrip()
+
+    @property
+    def _ends(self) -> list[str]:
+        return [written(end, self.form) for end in self.span or ()]
 
     def to_dict(self) -> dict[str, Any]:
         """The row as JSON data."""
@@ -63,9 +86,9 @@ class Measured:
             (
                 line.item.removeprefix(f"{self.section.place}: "),
                 written(line.paper) or "–",
-                written(line.ours, line.form) or "–",
+                line.shown,
                 MARKS[line.agrees],
-                line.note,
+                line.remark,
             )
             for line in self.lines
         ]
@@ -93,6 +116,18 @@ class Reproduction:
         return (
             f"{len(self.lines)} rows: {self.count(True)} as printed, {self.count(False)} different, each "
             f"with its reason, and {self.count(None)} measured where the paper prints no number."
+        )
+
+    @property
+    def repetition(self) -> str:
+        """How often was simulated, in a sentence; empty if nothing was."""
+        runs = [line.runs for line in self.lines if line.runs is not None]
+        if not runs:
+            return ""
+        return (
+            f"Contact is chaotic, so what is simulated is repeated with joint positions off by up to "
+            f"{ROUNDING:g} rad, as by rounding: {max(runs)} runs, but {FEW} where those agree to "
+            f"{ALIKE:.0%}; the notes say how many. Numbers are medians, with (least to greatest)."
         )
 
 
@@ -141,8 +176,14 @@ def _measured(section: Section, row: Claim, bench: Bench) -> ClaimResult:
         value = MEASURES[row.measure](bench, **row.with_)
     except MissingDependencyError as error:
         return ClaimResult(item, row.paper, None, f"not measured: {error}", None, form)
-    ours = _scaled(value, UNITS.get(row.unit, 1.0))
-    return ClaimResult(item, row.paper, ours, row.note, agreement(row.paper, ours, row.within), form)
+    factor, span, runs = UNITS.get(row.unit, 1.0), None, None
+    if isinstance(value, Scatter):
+        runs = len(value.values)
+        span = value.span and (value.span[0] * factor, value.span[1] * factor)
+        value = value.middle
+    ours = _scaled(value, factor)
+    agrees = agreement(row.paper, ours, row.within)
+    return ClaimResult(item, row.paper, ours, row.note, agrees, form, span, runs)
 
 
 def _scaled(value: Value, factor: float) -> Value:

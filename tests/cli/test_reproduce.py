@@ -46,6 +46,13 @@ def test_the_text_sets_both_values_side_by_side_and_sums_up(cli, paper, tmp_path
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["rows.json"]
 
 
+def test_the_page_names_the_number_of_runs_that_was_asked_for(cli, refused, paper, tmp_path):
+    assert cli("reproduce", paper, "--runs", "20", "-o", "out").code == 0
+    page = (tmp_path / "out" / "README.md").read_text(encoding="utf-8")
+    assert f"screwkin reproduce {paper} --runs 20 -o out" in page
+    assert "--runs" in refused(cli("reproduce", paper, "--runs", "0", "-o", "none"), 2)
+
+
 def test_an_unknown_paper_lists_the_valid_ones(cli, refused, tmp_path):
     message = refused(cli("reproduce", "biolod"), 2)
     assert "unknown paper 'biolod'; valid: bioloid" in message
