@@ -248,3 +248,9 @@ def test_without_builtins_ctypes_computes_the_same(monkeypatch, call) -> None:
         np.testing.assert_array_equal(outputs[0], call(T, q)[0])
     finally:
         native._builtins.cache_clear()
+
+
+def test_the_operations_of_a_batch_decide_when_cores_share_a_batch() -> None:
+    samples = native.shared_from(DOOR.guarded)
+    assert samples * DOOR.guarded.operations >= native.SHARED_FROM
+    assert (samples - 1) * DOOR.guarded.operations < native.SHARED_FROM
