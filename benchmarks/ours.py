@@ -14,7 +14,7 @@ from benchmarks.contest import Contestant, Contestants, Result
 from benchmarks.workloads import Dynamic, Motion, Reach, Stance
 from screwkin.analysis.workspace import workspace
 from screwkin.compiler.emit_python import run_numpy
-from screwkin.compiler.native import THREADED_FROM
+from screwkin.compiler.native import shared_from
 from screwkin.compiler.program import Program
 from screwkin.compiler.records import identifier
 from screwkin.compiler.run import machine_code, python_function
@@ -125,7 +125,7 @@ def _rate_kernels(robot: Robot, given: Motion) -> Contestants:
     if compiled is not None:
         alone = replace(compiled, cores=1)
         contestants[f"{NAME}, C kernel, one core"] = Contestant(alone.bound(flat, filled), result)
-        if count >= THREADED_FROM:
+        if count >= shared_from(program):
             contestants[f"{NAME}, C kernel, all cores"] = Contestant(compiled.bound(flat, filled), result)
     if count == 1:
         function, sample = python_function(program), [array[0].tolist() for array in flat]

@@ -6,6 +6,7 @@
 
 #include <pthread.h>
 #include <stddef.h>
+#include <stdlib.h>
 #include <string.h>
 
 typedef ptrdiff_t ssize;
@@ -43,6 +44,7 @@ typedef struct {
 typedef struct {
     const plan *of;
     double *arrays[MOST];
+    ssize steps[MOST]; /* numbers from one sample to the next */
     ssize count;
     int good;
 } part;
@@ -66,7 +68,7 @@ static void *compute(void *given)
         for (ssize i = 0; i < count; ++i)
             own->good &= guards[i] <= p->limit;
         for (ssize k = 0; k < arrays; ++k)
-            own->arrays[k] += count * p->numbers[k];
+            own->arrays[k] += count * own->steps[k];
     }
     return NULL;
 }
@@ -86,8 +88,10 @@ static int computed(part *all)
         if (own != all) {
             own->of = p;
             own->count = all->count * (c + 1) / cores - first;
-            for (ssize k = 0; k < p->inputs + p->outputs; ++k)
-                own->arrays[k] = all->arrays[k] + first * p->numbers[k];
+            for (ssize k = 0; k < p->inputs + p->outputs; ++k) {
+                own->steps[k] = all->steps[k];
+                own->arrays[k] = all->arrays[k] + first * all->steps[k];
+            }
         }
         running[c] = c && pthread_create(&threads[c], NULL, compute, own) == 0;
         if (!running[c])
@@ -115,30 +119,50 @@ typedef struct {
 
 enum { CONTIGUOUS = 1, ALIGNED = 0x100, WRITABLE = 0x400 };
 
-/* What arrays must be, and the batch in front of their inner axes, which the first of them decides. */
+/* What arrays must be, and the batch in front of their inner axes, which the first that has one decides. */
 typedef struct {
     object *type, *dtype;
     int flags;
     ssize axes, batch[AXES];
 } kind;
 
-/* Where the doubles of an array lie; NULL if it is not of the kind. */
+/* Where the doubles of an array lie, which has the batch or is one sample; NULL if it is not of the kind. */
 static double *doubles(object *given, kind *wanted, const ssize *inner, ssize axes)
 {
     const array *x = (const array *)given;
     if (given->type != wanted->type || x->dtype != wanted->dtype || (x->flags & wanted->flags) != wanted->flags)
         return NULL;
     const ssize before = x->axes - axes;
-    if (before < 0 || x->axes > AXES)
+    if (before < 0 || x->axes > AXES || memcmp(inner, x->shape + before, (size_t)axes * sizeof(ssize)))
         return NULL;
-    if (wanted->axes < 0) {
+    if (before && !wanted->axes) {
         wanted->axes = before;
         memcpy(wanted->batch, x->shape, (size_t)before * sizeof(ssize));
     }
-    if (before != wanted->axes || memcmp(wanted->batch, x->shape, (size_t)before * sizeof(ssize)) ||
-        memcmp(inner, x->shape + before, (size_t)axes * sizeof(ssize)))
+    if (before && (before != wanted->axes || memcmp(wanted->batch, x->shape, (size_t)before * sizeof(ssize))))
         return NULL;
     return x->data;
+}
+
+/* Samples that all inputs of one sample are repeated for: as many as are computed together. Their memory, or NULL. */
+static double *repeated(part *all, const int *alone)
+{
+    const plan *p = all->of;
+    const ssize rows = all->count < 2 * BLOCK ? all->count : 2 * BLOCK;
+    ssize size = 0;
+    for (ssize k = 0; k < p->inputs; ++k)
+        size += alone[k] ? p->numbers[k] : 0;
+    double *memory = malloc((size_t)(rows * size) * sizeof(double)), *at = memory;
+    for (ssize k = 0; memory && k < p->inputs; ++k) {
+        if (!alone[k])
+            continue;
+        for (ssize i = 0; i < rows; ++i)
+            memcpy(at + i * p->numbers[k], all->arrays[k], (size_t)p->numbers[k] * sizeof(double));
+        all->arrays[k] = at;
+        all->steps[k] = 0;
+        at += rows * p->numbers[k];
+    }
+    return memory;
 }
 
 static object *none(void)
@@ -155,27 +179,31 @@ static object *checked(object *self, object *const *given, ssize count)
 {
     const plan *p = (const plan *)PyBytes_AsString(PyTuple_GetItem(self, 0));
     const ssize *axes = p->numbers + p->inputs + p->outputs, *shape = axes + p->inputs + p->outputs;
-    kind wanted = {.axes = -1, .flags = CONTIGUOUS | ALIGNED};
-    double scalars[MOST];
+    kind wanted = {.axes = 0, .flags = CONTIGUOUS | ALIGNED};
+    double scalars[MOST], *memory = NULL;
+    int alone[MOST], repeat = 0;
     part all = {.of = p, .count = 1};
     wanted.type = PyTuple_GetItem(self, 1);
     wanted.dtype = PyTuple_GetItem(self, 2);
     if (count != p->inputs)
         return none();
     for (ssize k = 0; k < count; shape += axes[k++]) {
-        if (given[k]->type == PyTuple_GetItem(self, 3) && axes[k] == 0 && wanted.axes <= 0) {
-            wanted.axes = 0;
+        alone[k] = 1;
+        if (given[k]->type == PyTuple_GetItem(self, 3) && axes[k] == 0) {
             scalars[k] = PyFloat_AsDouble(given[k]);
             all.arrays[k] = &scalars[k];
         } else {
             all.arrays[k] = doubles(given[k], &wanted, shape, axes[k]);
+            alone[k] = all.arrays[k] && ((const array *)given[k])->axes == axes[k];
         }
         if (!all.arrays[k])
             return none();
+        repeat |= alone[k];
     }
+    memcpy(all.steps, p->numbers, (size_t)(p->inputs + p->outputs) * sizeof(ssize));
     for (ssize a = 0; a < wanted.axes; ++a)
         all.count *= wanted.batch[a];
-    if (wanted.axes < 0 || all.count == 0)
+    if (count == 0 || all.count == 0)
         return none();
 
     object *outputs;
@@ -203,11 +231,16 @@ static object *checked(object *self, object *const *given, ssize count)
     wanted.flags |= WRITABLE;
     for (ssize k = 0; good && k < p->outputs; ++k) {
         const ssize at = p->inputs + k;
-        all.arrays[at] = doubles(PyTuple_GetItem(outputs, k), &wanted, shape, axes[at]);
+        object *one = PyTuple_GetItem(outputs, k);
+        all.arrays[at] = doubles(one, &wanted, shape, axes[at]);
         shape += axes[at];
-        good = all.arrays[at] != NULL;
+        good = all.arrays[at] && ((const array *)one)->axes == wanted.axes + axes[at];
     }
-    if (good && computed(&all))
+    if (good && repeat && wanted.axes)
+        good = (memory = repeated(&all, alone)) != NULL;
+    good = good && computed(&all);
+    free(memory);
+    if (good)
         return outputs;
     Py_DecRef(outputs);
     return none();
@@ -221,6 +254,7 @@ static object *again(object *self, object *unused)
     memcpy(all.arrays, PyBytes_AsString(PyTuple_GetItem(self, 1)),
            (size_t)(all.of->inputs + all.of->outputs) * sizeof(double *));
     memcpy(&all.count, PyBytes_AsString(PyTuple_GetItem(self, 2)), sizeof(ssize));
+    memcpy(all.steps, all.of->numbers, (size_t)(all.of->inputs + all.of->outputs) * sizeof(ssize));
     computed(&all);
     return none();
 }

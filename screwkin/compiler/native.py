@@ -6,6 +6,7 @@ Nothing here is required: without a compiler, or where it fails, ``compiled`` gi
 from __future__ import annotations
 
 import ctypes
+import math
 import os
 import platform
 import shutil
@@ -32,8 +33,8 @@ FLAGS = (
 """Fused multiply-adds and no errno, but IEEE arithmetic otherwise: NaN and infinity keep their meaning."""
 TUNED = ("-fschedule-insns", "-fsched-pressure")
 """Tried first, as not every compiler knows them: operations that wait for nothing move in front of others."""
-THREADED_FROM = 8192
-"""Samples from which the batch is shared among the processor's cores."""
+SHARED_FROM = 1.5e6
+"""Operations of a batch from which the processor's cores share it: starting a thread costs some 1e5."""
 
 
 @cache
@@ -92,7 +93,8 @@ class Native:
 
         Returns:
             A function from the inputs to these outputs; None if an input is not a C-contiguous float64 NumPy
-            array of the batch that all have, if a sample exceeds the limit, and where there is no builtin.
+            array of one sample or of the batch that all others have, if a sample exceeds the limit, and
+            where there is no builtin.
         """
         method, outputs = _builtins(), self.program.outputs[:-1]
         if method is None or len(self.program.inputs) + len(outputs) > calls.MOST:
@@ -103,7 +105,13 @@ class Native:
         many, one = (_addressof(function) for function in (self.many, self.one))
         cores = self.cores or _cores()
         inputs = self.program.inputs
-        return calls.plan(many, one, inputs, outputs, cores=cores, shared_from=THREADED_FROM, limit=limit)
+        first = shared_from(self.program)
+        return calls.plan(many, one, inputs, outputs, cores=cores, shared_from=first, limit=limit)
+
+
+def shared_from(program: Program) -> int:
+    """Samples from which a batch is shared among the processor's cores."""
+    return max(1, math.ceil(SHARED_FROM / max(program.operations, 1)))
 
 
 def _addressof(function: Any) -> int:

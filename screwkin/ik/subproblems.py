@@ -7,7 +7,20 @@ Source: Paden (1986), Kahan; in the form of Elias and Wen (2025), "IK-Geo", for 
 
 from __future__ import annotations
 
-from screwkin.algebra.scalar import Scalar, atan2, is_symbolic, minus, plus, root, sqrt, times, where
+from screwkin.algebra.scalar import (
+    Scalar,
+    arc,
+    atan2,
+    is_symbolic,
+    larger,
+    least,
+    minus,
+    plus,
+    root,
+    sqrt,
+    times,
+    where,
+)
 from screwkin.algebra.se3 import Rotation, Vector, cross, dot, rotate
 
 
@@ -32,15 +45,14 @@ def level_turns(s: Vector, a: Vector, m: Vector, level: Scalar) -> tuple[Scalar,
     fixed = times(dot(m, s), dot(s, a))
     along, across, wanted = minus(dot(m, a), fixed), dot(m, cross(s, a)), minus(level, fixed)
     size = sqrt(plus(times(along, along), times(across, across)))
-    square = times(minus(size, wanted), plus(size, wanted))
-    middle = atan2(across, along)
-    aside = atan2(root(square), wanted)
-    whole = times(dot(a, a), dot(m, m))
-    return (
-        middle + aside,
-        middle - aside,
-        square / (whole if is_symbolic(whole) else where(whole > 0, whole, 1.0)),
-    )
+    square, whole = times(minus(size, wanted), plus(size, wanted)), times(dot(a, a), dot(m, m))
+    if is_symbolic(square):
+        middle, aside = atan2(across, along), atan2(root(square), wanted)
+        return middle + aside, middle - aside, square / whole
+    inverse = 1 / where(size > 0, size, 1.0)  # both points are so far from the origin
+    middle = arc(across * inverse, where(size > 0, along * inverse, 1.0))
+    aside = arc(root(square) * inverse, larger(least(wanted * inverse, 1.0), -1.0))
+    return middle + aside, middle - aside, square / where(whole > 0, whole, 1.0)
 
 
 def two_turns(s1: Vector, s2: Vector, a: Vector, b: Vector) -> list[tuple[Scalar, Scalar, Scalar]]:

@@ -66,6 +66,11 @@ class Door:
         if any(map(is_jax, arrays)):
             return self._by_jax(arrays)
         rows, batch = input_rows(self.arguments, arrays)
+        if is_prepared(self.guarded):  # batches that broadcast, or arrays of another kind
+            whole = [x.reshape(*batch, *s) for x, (s, _) in zip(rows, self._inputs, strict=True)]
+            found = self.by_machine(*whole)
+            if found is not None:
+                return found
         *outputs, guard = run_rows(self.guarded, rows, math.prod(batch))
         if not (guard <= LIMIT).all():
             checked_inputs(self.arguments, arrays)

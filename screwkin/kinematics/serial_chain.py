@@ -16,7 +16,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.scalar import Scalar, is_symbolic, sqrt, structural
-from screwkin.algebra.screws import AT_REST, Screw, advance, at, displacement, transport
+from screwkin.algebra.screws import AT_REST, Displacement, Screw, advance, at, displacement, transport
 from screwkin.algebra.se3 import (
     IDENTITY,
     Pose,
@@ -207,18 +207,29 @@ def forward(screws: Sequence[Screw], thetas: Sequence[Scalar], tip: Pose) -> tup
 def separation(chain: SerialChain, q: Sequence[Scalar], target: Pose | Vector) -> tuple[Scalar, Scalar]:
     """How far the tip is from a pose or a position, any scalar.
 
+    The two halves of the chain are compared where they join, so that branches share the half that they have
+    in common, and closed forms the turns that they have made of it.
+
     Returns:
         Squared sine of half the angle between the orientations (0 for a position), squared distance [m^2].
     """
-    D = AT_REST
-    for screw, theta in zip(chain.screws, q, strict=True):
-        D = advance(D, screw, theta)
+    joints, half = list(zip(chain.screws, q, strict=True)), len(chain.screws) // 2
+    first, last = (_advanced(part) for part in (joints[:half], joints[half:]))
+    place = first @ (last @ chain.tip.p)
     if isinstance(target, Vector):
-        apart = D @ chain.tip.p - target
-        return 0, dot(apart, apart)
-    R, apart = D.R @ chain.tip.R, D @ chain.tip.p - target.p
-    columns = zip((R.x, R.y, R.z), (target.R.x, target.R.y, target.R.z), strict=True)
+        return 0, dot(place - target, place - target)
+    R, apart = first.R, place - target.p
+    wanted = (target.R @ chain.tip.R.T) @ last.R.T
+    columns = zip((R.x, R.y, R.z), (wanted.x, wanted.y, wanted.z), strict=True)
     return sum(dot(a - b, a - b) for a, b in columns) / 8, dot(apart, apart)
+
+
+def _advanced(joints: Sequence[tuple[Screw, Scalar]]) -> Displacement:
+    """What the body behind these joints undergoes, seen from the body before them."""
+    D = AT_REST
+    for screw, theta in joints:
+        D = advance(D, screw, theta)
+    return D
 
 
 def miss(chain: SerialChain, q: Sequence[Scalar], target: Pose | Vector) -> Scalar:

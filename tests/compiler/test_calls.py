@@ -49,6 +49,21 @@ def test_a_builtin_computes_what_the_program_computes(call, batch) -> None:
     np.testing.assert_allclose(found, expected, atol=1e-14)
 
 
+@pytest.mark.parametrize("batch", [(1,), (2, 3), (600,), (9000,)])
+@pytest.mark.parametrize("alone", [0, 1])
+def test_one_sample_of_an_input_serves_a_batch_of_the_others(call, batch, alone: int) -> None:
+    """Alone, in blocks, and shared among threads: the same bits as repeated arrays give."""
+    arrays = list(plain(batch))
+    arrays[alone] = plain(())[alone]
+    repeated = [
+        np.ascontiguousarray(np.broadcast_to(a, (*batch, *a.shape[-axes:])))
+        for a, axes in zip(arrays, (2, 1), strict=True)
+    ]
+    np.testing.assert_array_equal(call(*arrays)[0], call(*repeated)[0])
+    arrays[alone] = arrays[alone] * np.nan
+    assert call(*arrays) is None
+
+
 @pytest.mark.parametrize("cores", [1, 2, 3, 7, 100])
 def test_any_number_of_cores_gives_the_same_bits(cores: int) -> None:
     compiled = machine_code(DOOR.guarded)
@@ -86,8 +101,8 @@ def foreign(T, q, rng):
         (T, q.view(Subclass)),
         (np.asfortranarray(T), q) if T.ndim == 2 else (T[::-1], q),
         (np.swapaxes(T, -1, -2), q),
-        (T, np.stack([q, q])),
-        (T[None], q),
+        (T[None], np.stack([q, q])),
+        (T[None], q) if T.ndim > 2 else (T[None], q[None, None]),
         (T[:0] if T.ndim > 2 else T[None][:0], q),
         (T, q * np.nan),
         (T, q * np.inf),
@@ -128,15 +143,16 @@ def test_random_arrays_are_computed_or_refused(call) -> None:
                 value.flags.writeable = False
             arrays.append(value)
         found = call(*arrays)
+        batch, fit = batches[0] or batches[1], batches[0] == batches[1] or () in batches
         whole = all(a.dtype == float and a.dtype.isnative and a.flags.c_contiguous for a in arrays)
         if found is not None:
             answered += 1
             assert whole
-            assert batches[0] == batches[1]
-            assert 0 not in batches[0]
-            assert found[0].shape == (*batches[0], 3)
+            assert fit
+            assert 0 not in batch
+            assert found[0].shape == (*batch, 3)
         else:
-            assert not whole or batches[0] != batches[1] or 0 in batches[0]
+            assert not whole or not fit or 0 in batch
     assert answered > 200
 
 
@@ -232,3 +248,9 @@ def test_without_builtins_ctypes_computes_the_same(monkeypatch, call) -> None:
         np.testing.assert_array_equal(outputs[0], call(T, q)[0])
     finally:
         native._builtins.cache_clear()
+
+
+def test_the_operations_of_a_batch_decide_when_cores_share_a_batch() -> None:
+    samples = native.shared_from(DOOR.guarded)
+    assert samples * DOOR.guarded.operations >= native.SHARED_FROM
+    assert (samples - 1) * DOOR.guarded.operations < native.SHARED_FROM

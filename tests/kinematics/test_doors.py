@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import screwkin as sk
+from screwkin.compiler.native import compiler
 from screwkin.errors import InputError, ShapeError, SingularError, UnknownNameError
+from screwkin.kinematics import door
 from screwkin.kinematics.status import Status
 
 
@@ -159,3 +163,16 @@ def test_rates_of_real_primary_joints_are_asked_for_directly(robot: sk.Robot) ->
 def test_a_missing_tip_twist_is_named(robot: sk.Robot, mechanism: sk.Mechanism) -> None:
     with pytest.raises(InputError, match="left_foot"):
         sk.virtual_motion(mechanism, sk.home(robot), np.zeros(6), {"right_foot": np.zeros(6)})
+
+
+def test_of_a_prepared_robot_a_broadcast_batch_takes_machine_code_too(
+    robot: sk.Robot, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One base pose for many joint positions, as lists of them: the same numbers, and by the same path."""
+    body, state = replace(robot), batch_of(robot, (5,))
+    sk.prepare(body, "frame_pose")
+    if compiler():
+        monkeypatch.setattr(door, "run_rows", lambda *_: pytest.fail("the general path"))
+    poses = sk.frame_pose(body, sk.State(np.eye(4), state.q.tolist()), "left_hand")
+    bases = np.tile(np.eye(4), (5, 1, 1))
+    assert np.array_equal(poses, sk.frame_pose(body, sk.State(bases, state.q), "left_hand"))
