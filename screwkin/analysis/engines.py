@@ -162,15 +162,19 @@ def opened(
             )
         return KinematicBackend(robot)
     dt = STEP if springs is not None else None
-    servos: Servos | None = None if springs is None else SpringServos(robot, springs, STEP)
-    if motors:
-        servos = MotorServos(motors, MuJoCoPhysics().dt, str(compliance.motors))
+    physics: Physics | MuJoCoPhysics
     if engine == "pybullet":
         physics = _refined(Physics(sole_stiffness=soles), dt, finer)
-        return PyBulletBackend(robot, physics, gui, servos)
-    if soles is not None:
+    elif soles is not None:
         raise InputError("engine mujoco has no elastic soles; use pybullet")
-    return MuJoCoBackend(robot, _refined(MuJoCoPhysics(), dt, finer), gui, servos)
+    else:
+        physics = _refined(MuJoCoPhysics(), dt, finer)
+    servos: Servos | None = None if springs is None else SpringServos(robot, springs, STEP)
+    if motors:
+        servos = MotorServos(motors, physics.dt, str(compliance.motors))
+    if isinstance(physics, Physics):
+        return PyBulletBackend(robot, physics, gui, servos)
+    return MuJoCoBackend(robot, physics, gui, servos)
 
 
 P = TypeVar("P", Physics, MuJoCoPhysics)

@@ -110,6 +110,11 @@ def _verdict_faults(robot: Robot, trajectory: Trajectory, verdict: Verdict) -> l
         for name, value in anew.items()
         if not _same(value, getattr(verdict, name))
     ]
+    if anew["compensation"] == "none" and verdict.compensation != "none":
+        faults.append(
+            f"servos {verdict.servo} were simulated with commands that allow for them, which this file does "
+            "not hold: write those with screwkin walk --compensate dynamic, then validate and send that file"
+        )
     if set(verdict.torque_use) != set(robot.joint_names):
         faults.append(f"torque_use is not of the joints of {robot.name}")
     return faults

@@ -36,11 +36,9 @@ _FINER = {
     "half the step": Refinement(step=2),
     "twice the iterations": Refinement(iterations=2),
 }
-
-
 _NOT_THE_FILE = (
-    "the servos were sent the plan with the torque term, which the file does not hold, so send refuses it; "
-    "to send, write the commands with walk --compensate dynamic and validate those"
+    "the servos were sent commands that allow for them, which the file does not hold, so send refuses it; to "
+    "send, write the commands with walk --compensate dynamic and validate those"
 )
 
 

@@ -127,7 +127,11 @@ def _compliance(
 ) -> SimulatedCompliance:
     """The compliance that a command line asks for."""
     if not compliant and (repeat or k is not None):
-        raise InputError(f"{'--repeat' if repeat else '--stiffness'} is of elastic servos; add --compliant")
+        option, instead = (
+            "--repeat" if repeat else "--stiffness",
+            "" if servo == RIGID else " instead of --servo",
+        )
+        raise InputError(f"{option} is of elastic servos; add --compliant{instead}")
     return SimulatedCompliance(Compliance(k) if compliant else None, sole_stiffness, repeat).on(servo)
 
 

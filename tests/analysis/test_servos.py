@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import screwkin as sk
-from screwkin.analysis.engines import SimulatedCompliance
+from screwkin.analysis.engines import Refinement, SimulatedCompliance, opened
 from screwkin.analysis.readiness import ready
 from screwkin.analysis.validate import planned_facts
 from screwkin.analysis.verdict import bound_to, verdict_of
@@ -38,8 +38,9 @@ def test_the_torque_term_on_a_plan_is_a_warning_and_send_refuses_such_a_verdict(
     """What send would play is the plan; only the file with the commands is what was validated."""
     assert any("--compensate dynamic" in warning for warning in verdict.warnings)
     path = passing(fast.save(tmp_path / "trajectory.npz"), servo="table", compensation=verdict.compensation)
-    with pytest.raises(SafetyError, match="compensation is none, the verdict says dynamic"):
+    with pytest.raises(SafetyError, match="compensation is none, the verdict says dynamic") as refused:
         ready(path)
+    assert "write those with screwkin walk --compensate dynamic" in str(refused.value)
 
 
 def test_a_servo_file_that_changed_since_is_refused(verdict, fast, tmp_path):
@@ -107,6 +108,35 @@ def test_commands_are_compensated_once_and_only_for_motors(fast):
     assert list(stiffness_of(commands).values()) == pytest.approx([40.0] * 18, rel=1e-4)
     assert TABLE.commands(ROBOT, commands) is commands
     assert SimulatedCompliance().commands(ROBOT, fast) is fast
+
+
+def test_a_verdict_on_motors_outlasts_finer_settings_of_the_solver():
+    pytest.importorskip("mujoco")
+    walk = sk.walk(ROBOT, sk.load_gait("smooth"), steps=1)
+    check = sk.validate(ROBOT, walk, "mujoco", servo="table", check_solver=True)
+    assert check.passed, check.reasons
+    assert check.solver["mujoco"]["passed"] == {
+        "usual": True,
+        "half the step": True,
+        "twice the iterations": True,
+    }
+
+
+def test_motors_are_checked_against_the_step_that_the_engine_takes(tmp_path):
+    """A rotor of 1e-4 kg m^2 swings up by itself at 1 ms, and not at half of it."""
+    pytest.importorskip("mujoco")
+    model = load_motor("AX-12A")
+    file = tmp_path / "light.toml"
+    file.write_text(motor_text(replace(model, motor=replace(model.motor, armature=1e-4))), encoding="utf-8")
+    light = SimulatedCompliance().on(file)
+    with pytest.raises(InputError, match="a step of 1 ms is too long for the servo"):
+        opened(ROBOT, "mujoco", light)
+    opened(ROBOT, "mujoco", light, finer=Refinement(step=2)).close()
+
+
+def test_motors_are_not_repeated_under_other_conditions():
+    with pytest.raises(InputError, match="only walks on elastic servos are repeated"):
+        SimulatedCompliance(repeat=True).on("table")
 
 
 def test_unknown_models_and_two_kinds_of_servos_are_refused(fast):

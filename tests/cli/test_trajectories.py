@@ -162,6 +162,10 @@ def test_an_unknown_engine_is_refused_before_anything_is_simulated(cli, refused,
     [
         (["--stiffness", "60"], "--stiffness is of elastic servos; add --compliant"),
         (["--repeat"], "--repeat is of elastic servos; add --compliant"),
+        (
+            ["--repeat", "--servo", "table"],
+            "--repeat is of elastic servos; add --compliant instead of --servo",
+        ),
         (["--compliant", "--stiffness", "0"], "stiffness is 0.0; it must be a positive number in N m/rad"),
         (["--compliant", "-k", "-5"], "stiffness is -5.0; it must be a positive number in N m/rad"),
         (["--compliant", "-k", "nan"], "stiffness is nan; it must be a positive number in N m/rad"),
