@@ -12,6 +12,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.scalar import Scalar
+from screwkin.algebra.se3 import Rotation, vector_from_array
 from screwkin.model.records import Inertia
 
 _RELATIVE = 1e-9  # of the greatest moment: rounding of nine written digits
@@ -46,6 +47,20 @@ def broken_triangle(inertia: Inertia) -> str:
     return (
         f"{_figures((a, b, c))} break the triangle inequality: {c:.6g} > {a:.6g} + {b:.6g}, no body has them"
     )
+
+
+def is_flat(inertia: Inertia) -> bool:
+    """Whether the least principal moment is zero but for rounding: a point or a line."""
+    moments = np.linalg.eigvalsh(inertia_matrix(inertia))
+    return bool(moments[0] <= _RELATIVE * moments[2])
+
+
+def principal_axes(inertia: Inertia) -> tuple[Rotation, Inertia]:
+    """Right-handed axes about which there are no products of inertia, and the moments about them."""
+    moments, axes = np.linalg.eigh(inertia_matrix(inertia))
+    axes[:, 2] *= np.linalg.det(axes)
+    x, y, z = (vector_from_array(axis) for axis in axes.T)
+    return Rotation(x, y, z), inertia_from_matrix(np.diag(np.maximum(moments, 0)))
 
 
 def without_noise(inertia: Inertia, mass: float) -> Inertia:

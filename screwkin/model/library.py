@@ -79,7 +79,7 @@ def _find(what: str, kind: str, name_or_path: str | Path) -> Path:
     name, valid = str(name_or_path), _names(kind)
     if name in valid:
         return data_folder(kind) / f"{name}.toml"
-    suffixed = name.lower().endswith((".toml", ".urdf", ".csv"))
+    suffixed = name.lower().endswith((".toml", ".urdf", ".csv", ".xacro", ".xml", ".sdf"))
     looks_like_path = isinstance(name_or_path, Path) or suffixed or "/" in name or "\\" in name
     if looks_like_path and _exists(Path(name)):
         return Path(name)

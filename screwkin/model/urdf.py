@@ -26,7 +26,13 @@ from screwkin.algebra.se3 import (
     vector_from_array,
 )
 from screwkin.errors import InputError
-from screwkin.model.inertias import inertia_from_matrix, inertia_matrix
+from screwkin.model.inertias import (
+    broken_triangle,
+    inertia_from_matrix,
+    inertia_matrix,
+    is_flat,
+    principal_axes,
+)
 from screwkin.model.records import Box, Inertia, Joint, Link
 from screwkin.model.robot import Robot
 from screwkin.model.toml_out import rpy_of
@@ -91,9 +97,10 @@ def urdf_from_robot(robot: Robot) -> str:
     """The URDF text of a robot: its bodies and joints, and tips and soles as links fixed to their bodies.
 
     Every link has an ``inertial``, massless ones of zeros, as PyBullet would take 1 kg for one without.
-    MuJoCo refuses massless links that move: an element that MuJoCo alone reads asks for 1 mg and 1e-9 kg m^2
-    there. For time steps write ``robot.with_inertia_floor()``. Limbs, postures and servos have no place in
-    URDF; a fixed base is the reader's choice.
+    MuJoCo refuses links that move without mass or with inertias that no body has: an element that MuJoCo
+    alone reads asks for 1 mg, 1e-9 kg m^2 and balanced moments there. For time steps write
+    ``robot.with_inertia_floor()``. Limbs, postures and servos have no place in URDF; a fixed base is the
+    reader's choice.
 
     Args:
         robot: of numbers.
@@ -121,8 +128,8 @@ def _document(robot: Robot, fixed: Mapping[str, tuple[str, Pose]]) -> str:
     root = ElementTree.Element("robot", name=robot.name)
     frames, colours = urdf_frames(robot), link_colours(robot)
     palette = {WHITE: "white", SLATE: "slate", ORANGE: "orange"}
-    if any(link.mass == 0 for link in robot.links if link.name != robot.base_link):
-        ElementTree.SubElement(ElementTree.SubElement(root, "mujoco"), "compiler", _BOUNDS)
+    if options := _mujoco_options(robot):
+        ElementTree.SubElement(ElementTree.SubElement(root, "mujoco"), "compiler", options)
     for colour in dict.fromkeys(colours.values()):
         material = ElementTree.SubElement(root, "material", name=palette[colour])
         ElementTree.SubElement(material, "color", rgba=" ".join(map(repr, colour)))
@@ -134,6 +141,17 @@ def _document(robot: Robot, fixed: Mapping[str, tuple[str, Pose]]) -> str:
         _add_frame(root, name, body, frames[body].inverse @ pose)
     ElementTree.indent(root)
     return '<?xml version="1.0"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def _mujoco_options(robot: Robot) -> dict[str, str]:
+    """What MuJoCo must be asked for to load inertias that it refuses: least moments, and balanced ones."""
+    options: dict[str, str] = {}
+    for link in robot.links:
+        if link.name != robot.base_link and (link.mass == 0 or is_flat(link.inertia)):
+            options |= _BOUNDS
+        if broken_triangle(link.inertia):
+            options["balanceinertia"] = "true"
+    return options
 
 
 def _refuse_what_urdf_cannot_say(robot: Robot) -> None:
@@ -160,10 +178,12 @@ def _add_origin(parent: ElementTree.Element, pose: Pose) -> None:
 
 
 def _add_inertial(link: ElementTree.Element, com: Vector, mass: Scalar, inertia: Inertia) -> None:
-    inertial = ElementTree.SubElement(link, "inertial")
-    _add_origin(inertial, Pose(UNTURNED, com))
+    """Inertia in the axes of the link; of a body without extent, which some readers refuse so, in its own."""
+    inertial, axes, i = ElementTree.SubElement(link, "inertial"), UNTURNED, inertia
+    if is_flat(inertia) and any((i.xy, i.xz, i.yz)):
+        axes, i = principal_axes(inertia)
+    _add_origin(inertial, Pose(axes, com))
     ElementTree.SubElement(inertial, "mass", value=_number(mass))
-    i = inertia
     names = {"ixx": i.xx, "ixy": i.xy, "ixz": i.xz, "iyy": i.yy, "iyz": i.yz, "izz": i.zz}
     ElementTree.SubElement(inertial, "inertia", {name: _number(value) for name, value in names.items()})
 

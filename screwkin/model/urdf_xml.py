@@ -175,7 +175,7 @@ def _read_mimic(reader: Reader, name: str, element: Element, known: set[str], mi
     (factor,) = reader.numbers(row, element, "multiplier", (1.0,))
     (offset,) = reader.numbers(row, element, "offset", (0.0,))
     coupling = f"{name} = {factor:g} {leader} {offset + 0.0:+g}"
-    if leader not in known:
+    if leader not in known and mimic == "refuse":
         reader.fault(row, "mimic", f"there is no joint {leader!r}", "Name a joint of the file")
     elif mimic == "refuse":
         found = f"couples two joints, {coupling}, which tables cannot say"

@@ -78,3 +78,10 @@ def test_what_cannot_be_read_is_refused(tmp_path: Path) -> None:
     ):
         with pytest.raises(InputError, match="no parameters to keep as symbols"):
             call()
+
+
+def test_xacro_is_refused_by_its_suffix_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("r.urdf.xacro").write_text('<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:leg/></robot>')
+    with pytest.raises(TableError, match="Run xacro first"):
+        load_robot("r.urdf.xacro")

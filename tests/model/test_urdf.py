@@ -17,6 +17,7 @@ from screwkin.algebra.se3 import IDENTITY, as_array
 from screwkin.analysis.chains import derived_tables
 from screwkin.errors import InputError
 from screwkin.model.dh_robot import robot_from_dh
+from screwkin.model.records import Inertia
 from screwkin.model.robot import Closure, Robot
 from screwkin.model.urdf import link_colours, urdf_frames, urdf_from_robot
 from screwkin.model.urdf_in import parse_urdf
@@ -137,14 +138,24 @@ def test_what_urdf_cannot_say_is_refused_by_name(robot: Robot) -> None:
         urdf_from_robot(replace(robot, closures=(loop,)))
 
 
-WRITTEN = ["bioloid", "poppy12", "dh", *(f"tree-{seed}" for seed in range(4))]
+WRITTEN = ["bioloid", "poppy12", "dh", "thin", *(f"tree-{seed}" for seed in range(4))]
 
 
 def written(name: str) -> Robot:
-    """A bundled robot; its chains from DH tables, all massless; or a random tree with turned link frames."""
+    """A bundled robot; its chains from DH tables, all massless; one of lines, points and impossible inertias;
+    or a random tree with turned link frames.
+    """
     if name == "dh":
         bioloid = sk.load_robot("bioloid")
         return robot_from_dh(derived_tables(bioloid, "modified"), "dh")
+    if name == "thin":
+        line, thick = Inertia(1e-3, 1e-3, 2e-3, 1e-3), Inertia(1e-3, 2e-3, 9e-3)
+        robot = sk.load_robot("poppy12")
+        links = [
+            replace(link, inertia=(line, thick, Inertia(0, 0, 0))[i % 3])
+            for i, link in enumerate(robot.links)
+        ]
+        return replace(robot, links=tuple(links))
     return without_helical(random_tree(int(name[5:]))) if name.startswith("tree-") else sk.load_robot(name)
 
 
