@@ -18,7 +18,8 @@ from screwkin.kinematics.door import Door
 from screwkin.kinematics.kinds import STATE
 from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.kinematics.serial_chain import SerialChain
-from screwkin.mechanism.limb_rates import Split, pose_rates, split_of
+from screwkin.mechanism.limb_motion import LimbMotion
+from screwkin.mechanism.limb_rates import Split, pose_rates
 from screwkin.mechanism.mechanism import Mechanism, VirtualChain, mechanism_of
 from screwkin.mechanism.network import coupling_screws, coupling_twists
 from screwkin.mechanism.scaling import characteristic_length, reference_couplings
@@ -65,11 +66,11 @@ def secondary_door(robot: Robot, primary: tuple[str, ...], secondary: tuple[str,
             if signs[name]:
                 wanted = wanted - twists[name] * rate * signs[name]
         names = [secondary[i] for i in own]
-        split, point = _split(mechanism, D, names, twists[names[0]])
-        columns = [at(point, twists[name] * signs[name]) for name in names]
-        values, determinant = pose_rates(columns, split, at(point, wanted), characteristic_length(robot))
-        for i, value in zip(own, values, strict=True):
-            rates[i] = value
+        split, point, axes, screws = _system(mechanism, D, q, names, twists)
+        here = turn(axes.T, at(point, wanted))
+        values, determinant = pose_rates(screws, split, here, characteristic_length(robot))
+        for i, name, value in zip(own, names, values, strict=True):
+            rates[i] = value * signs[name]
         least.append(_bound(mechanism, circuit, names, twists, point, D, determinant))
     recorder.output("secondary", rates)
     recorder.output("least", least)
@@ -142,24 +143,27 @@ def _sizes(robot: Robot, tip: VirtualChain, length: float) -> dict[str, float]:
     return own | {j.name: 1 + (r / length) ** 2 for j, r in zip(joints, reach, strict=True)}
 
 
-def _split(
-    mechanism: Mechanism, D: Sequence[Displacement], names: Sequence[str], first: Twist
-) -> tuple[Split | None, Vector]:
-    """Three neighbouring couplings that meet or are parallel, and where to express the screws; base axes.
+def _system(
+    mechanism: Mechanism,
+    D: Sequence[Displacement],
+    q: Sequence[Scalar],
+    names: Sequence[str],
+    twists: Mapping[str, Twist],
+) -> tuple[Split | None, Vector, Rotation, Sequence[Twist]]:
+    """The screws of a block: how they fall apart, their point and axes, and they themselves.
 
-    Without such couplings that is a point near the mechanism, at least on the axis of the first coupling.
+    Those of all joints of a limb are seen from a link amid the limb, as ``LimbMotion`` does. Where no
+    couplings meet, the point is one near the mechanism, at least on the axis of the first coupling.
     """
-    robot = mechanism.robot
-    carried = dict(zip(robot.link_names, D, strict=True))
+    robot, first = mechanism.robot, twists[names[0]]
+    split, point = None, cross(first.omega, first.v)
     for limb in robot.limbs:
         path = robot.path_to(limb.link)
-        tip = carried[limb.link] @ limb.frame.p
         if [robot.joint_names[i] for i in path] == list(names):
-            split = split_of(SerialChain.of(robot, limb.name))
-            if split is not None:
-                return split, carried[robot.joints[path[split.first]].parent] @ split.point
-            return None, tip
-        turning = {f"{limb.tip}.{axis}" for axis in ("rx", "ry", "rz")}
-        if turning == set(names[-3:]):
-            return Split("meeting", len(names) - 3, tip), tip
-    return None, cross(first.omega, first.v)
+            motion = LimbMotion.of(robot, limb, D, q, len(path) // 2)
+            return motion.split, motion.point, motion.axes, motion.twists
+        if {f"{limb.tip}.{axis}" for axis in ("rx", "ry", "rz")} == set(names[-3:]):
+            point = pose_in_base(robot, D, limb.tip).p
+            split = Split("meeting", len(names) - 3, point)
+            break
+    return split, point, UNTURNED, [at(point, twists[name]) for name in names]
