@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 
 from screwkin.algebra.scalar import Scalar, abs_, sqrt
 from screwkin.algebra.screws import Displacement, at, turn
-from screwkin.algebra.se3 import NO_TWIST, UNTURNED, Rotation, Twist, Vector, cross, dot
+from screwkin.algebra.se3 import IDENTITY, NO_TWIST, UNTURNED, ZERO, Pose, Rotation, Twist, Vector, cross, dot
 from screwkin.compiler.program import Recorder, kept
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.kinematics.arrays import Argument
@@ -18,6 +18,7 @@ from screwkin.kinematics.door import Door
 from screwkin.kinematics.kinds import STATE
 from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.kinematics.serial_chain import SerialChain
+from screwkin.mechanism.chains import chain_twists
 from screwkin.mechanism.limb_motion import LimbMotion
 from screwkin.mechanism.limb_rates import Split, pose_rates
 from screwkin.mechanism.mechanism import Mechanism, VirtualChain, mechanism_of
@@ -56,19 +57,26 @@ def secondary_door(robot: Robot, primary: tuple[str, ...], secondary: tuple[str,
     imposed = dict(zip(primary, recorder.input("primary", len(primary)), strict=True))
     twists = _in_base_axes(mechanism, R, q)
     D = link_displacements(robot, q)
+    bodies = _by_bodies(mechanism, R, D)
     rates: list[Scalar] = [0.0] * len(secondary)
     least = []
     for k in formula_blocks(mechanism):
         (circuit,), own = mechanism.blocks[k]
         signs = dict(zip(mechanism.couplings, mechanism.circuit_matrix[circuit].tolist(), strict=True))
         wanted = NO_TWIST
-        for name, rate in imposed.items():
-            if signs[name]:
-                wanted = wanted - twists[name] * rate * signs[name]
+        for name in robot.joint_names:
+            if name in imposed:
+                wanted = wanted - twists[name] * imposed[name] * signs[name]
+        for place, screws in bodies:
+            motion = NO_TWIST
+            for name, screw in screws.items():
+                if name in imposed:
+                    motion = motion + screw * imposed[name] * signs[name]
+            wanted = wanted - at(-place, turn(R.T, motion))
         names = [secondary[i] for i in own]
-        split, point, axes, screws = _system(mechanism, D, q, names, twists)
+        split, point, axes, columns = _system(mechanism, D, q, names, twists)
         here = turn(axes.T, at(point, wanted))
-        values, determinant = pose_rates(screws, split, here, characteristic_length(robot))
+        values, determinant = pose_rates(columns, split, here, characteristic_length(robot))
         for i, name, value in zip(own, names, values, strict=True):
             rates[i] = value * signs[name]
         least.append(_bound(mechanism, circuit, names, twists, point, D, determinant))
@@ -91,6 +99,23 @@ def _in_base_axes(mechanism: Mechanism, R: Rotation, q: Sequence[Scalar]) -> dic
         name: level[k] if name in real else turn(back, turned[k])
         for k, name in enumerate(mechanism.couplings)
     }
+
+
+def _by_bodies(
+    mechanism: Mechanism, R: Rotation, D: Sequence[Displacement]
+) -> list[tuple[Vector, dict[str, Twist]]]:
+    """Of every virtual chain its body's place, base axes, and its couplings' screws there, world axes.
+
+    What a chain imposes is added up at its body, turned and taken to the base origin once.
+    """
+    bodies, turned = [], Pose(R, ZERO)
+    for chain in mechanism.chains:
+        body = IDENTITY if chain.limb is None else pose_in_base(mechanism.robot, D, chain.limb.tip)
+        turning = R @ body.R @ mechanism.held(chain, turned).R.T
+        bodies.append(
+            (body.p, dict(zip(chain.names, chain_twists(chain.couplings, turning, ZERO), strict=True)))
+        )
+    return bodies
 
 
 def _bound(
