@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 
 from screwkin.algebra.scalar import Scalar, abs_, sqrt
 from screwkin.algebra.screws import Displacement, at, turn
-from screwkin.algebra.se3 import NO_TWIST, UNTURNED, Rotation, Twist, Vector, cross, dot
+from screwkin.algebra.se3 import IDENTITY, NO_TWIST, UNTURNED, ZERO, Pose, Rotation, Twist, Vector, cross, dot
 from screwkin.compiler.program import Recorder, kept
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.kinematics.arrays import Argument
@@ -18,7 +18,9 @@ from screwkin.kinematics.door import Door
 from screwkin.kinematics.kinds import STATE
 from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.kinematics.serial_chain import SerialChain
-from screwkin.mechanism.limb_rates import Split, pose_rates, split_of
+from screwkin.mechanism.chains import chain_twists
+from screwkin.mechanism.limb_motion import LimbMotion
+from screwkin.mechanism.limb_rates import Split, pose_rates
 from screwkin.mechanism.mechanism import Mechanism, VirtualChain, mechanism_of
 from screwkin.mechanism.network import coupling_screws, coupling_twists
 from screwkin.mechanism.scaling import characteristic_length, reference_couplings
@@ -55,21 +57,28 @@ def secondary_door(robot: Robot, primary: tuple[str, ...], secondary: tuple[str,
     imposed = dict(zip(primary, recorder.input("primary", len(primary)), strict=True))
     twists = _in_base_axes(mechanism, R, q)
     D = link_displacements(robot, q)
+    bodies = _by_bodies(mechanism, R, D)
     rates: list[Scalar] = [0.0] * len(secondary)
     least = []
     for k in formula_blocks(mechanism):
         (circuit,), own = mechanism.blocks[k]
         signs = dict(zip(mechanism.couplings, mechanism.circuit_matrix[circuit].tolist(), strict=True))
         wanted = NO_TWIST
-        for name, rate in imposed.items():
-            if signs[name]:
-                wanted = wanted - twists[name] * rate * signs[name]
+        for name in robot.joint_names:
+            if name in imposed:
+                wanted = wanted - twists[name] * imposed[name] * signs[name]
+        for place, screws in bodies:
+            motion = NO_TWIST
+            for name, screw in screws.items():
+                if name in imposed:
+                    motion = motion + screw * imposed[name] * signs[name]
+            wanted = wanted - at(-place, turn(R.T, motion))
         names = [secondary[i] for i in own]
-        split, point = _split(mechanism, D, names, twists[names[0]])
-        columns = [at(point, twists[name] * signs[name]) for name in names]
-        values, determinant = pose_rates(columns, split, at(point, wanted), characteristic_length(robot))
-        for i, value in zip(own, values, strict=True):
-            rates[i] = value
+        split, point, axes, columns = _system(mechanism, D, q, names, twists)
+        here = turn(axes.T, at(point, wanted))
+        values, determinant = pose_rates(columns, split, here, characteristic_length(robot))
+        for i, name, value in zip(own, names, values, strict=True):
+            rates[i] = value * signs[name]
         least.append(_bound(mechanism, circuit, names, twists, point, D, determinant))
     recorder.output("secondary", rates)
     recorder.output("least", least)
@@ -90,6 +99,23 @@ def _in_base_axes(mechanism: Mechanism, R: Rotation, q: Sequence[Scalar]) -> dic
         name: level[k] if name in real else turn(back, turned[k])
         for k, name in enumerate(mechanism.couplings)
     }
+
+
+def _by_bodies(
+    mechanism: Mechanism, R: Rotation, D: Sequence[Displacement]
+) -> list[tuple[Vector, dict[str, Twist]]]:
+    """Of every virtual chain its body's place, base axes, and its couplings' screws there, world axes.
+
+    What a chain imposes is added up at its body, turned and taken to the base origin once.
+    """
+    bodies, turned = [], Pose(R, ZERO)
+    for chain in mechanism.chains:
+        body = IDENTITY if chain.limb is None else pose_in_base(mechanism.robot, D, chain.limb.tip)
+        turning = R @ body.R @ mechanism.held(chain, turned).R.T
+        bodies.append(
+            (body.p, dict(zip(chain.names, chain_twists(chain.couplings, turning, ZERO), strict=True)))
+        )
+    return bodies
 
 
 def _bound(
@@ -142,24 +168,27 @@ def _sizes(robot: Robot, tip: VirtualChain, length: float) -> dict[str, float]:
     return own | {j.name: 1 + (r / length) ** 2 for j, r in zip(joints, reach, strict=True)}
 
 
-def _split(
-    mechanism: Mechanism, D: Sequence[Displacement], names: Sequence[str], first: Twist
-) -> tuple[Split | None, Vector]:
-    """Three neighbouring couplings that meet or are parallel, and where to express the screws; base axes.
+def _system(
+    mechanism: Mechanism,
+    D: Sequence[Displacement],
+    q: Sequence[Scalar],
+    names: Sequence[str],
+    twists: Mapping[str, Twist],
+) -> tuple[Split | None, Vector, Rotation, Sequence[Twist]]:
+    """The screws of a block: how they fall apart, their point and axes, and they themselves.
 
-    Without such couplings that is a point near the mechanism, at least on the axis of the first coupling.
+    Those of all joints of a limb are seen from a link amid the limb, as ``LimbMotion`` does. Where no
+    couplings meet, the point is one near the mechanism, at least on the axis of the first coupling.
     """
-    robot = mechanism.robot
-    carried = dict(zip(robot.link_names, D, strict=True))
+    robot, first = mechanism.robot, twists[names[0]]
+    split, point = None, cross(first.omega, first.v)
     for limb in robot.limbs:
         path = robot.path_to(limb.link)
-        tip = carried[limb.link] @ limb.frame.p
         if [robot.joint_names[i] for i in path] == list(names):
-            split = split_of(SerialChain.of(robot, limb.name))
-            if split is not None:
-                return split, carried[robot.joints[path[split.first]].parent] @ split.point
-            return None, tip
-        turning = {f"{limb.tip}.{axis}" for axis in ("rx", "ry", "rz")}
-        if turning == set(names[-3:]):
-            return Split("meeting", len(names) - 3, tip), tip
-    return None, cross(first.omega, first.v)
+            motion = LimbMotion.of(robot, limb, D, q, len(path) // 2)
+            return motion.split, motion.point, motion.axes, motion.twists
+        if {f"{limb.tip}.{axis}" for axis in ("rx", "ry", "rz")} == set(names[-3:]):
+            point = pose_in_base(robot, D, limb.tip).p
+            split = Split("meeting", len(names) - 3, point)
+            break
+    return split, point, UNTURNED, [at(point, twists[name]) for name in names]
