@@ -44,6 +44,22 @@ def prepared(robot: Robot, *quantities: str) -> Robot:
 def rates(robot: Robot, given: Motion) -> Contestants:
     """W1."""
 
+    def direct(robot: Robot) -> Contestant:
+        one = len(given.q) == 1
+        own = (lambda x: x[0]) if one else (lambda x: x)
+        state, waist = sk.State(own(given.T_world_base), own(given.q)), own(given.waist)
+        tips = {tip: own(x) for tip, x in given.tips.items()}
+
+        def run() -> Any:
+            return sk.tip_poses(robot, state), sk.joint_rates(robot, state, waist, tips)
+
+        def result(found: Any) -> Result:
+            poses, qd = found
+            return {"poses": poses.reshape(len(given.q), -1, 4, 4), "rates": qd.reshape(len(given.q), -1)}
+
+        run()
+        return Contestant(run, result)
+
     def public(robot: Robot) -> Contestant:
         mechanism, state = sk.closed_mechanism(robot), sk.State(given.T_world_base, given.q)
         if len(given.q) == 1:
@@ -68,8 +84,9 @@ def rates(robot: Robot, given: Motion) -> Contestants:
         run()
         return Contestant(run, result)
 
-    compiled = prepared(robot, "frame_pose", "virtual_motion", "secondary_rates")
-    plain = {PLAIN: public(robot), PREPARED: public(compiled)}
+    compiled = prepared(robot, "tip_poses", "joint_rates", "frame_pose", "virtual_motion", "secondary_rates")
+    plain = {PLAIN: direct(robot), PREPARED: direct(compiled)}
+    plain |= {f"{PLAIN}, closed mechanism": public(robot), f"{PREPARED}, closed mechanism": public(compiled)}
     return {**plain, **_bound(robot, given), **_rate_kernels(robot, given)}
 
 

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from screwkin.mechanism.mechanism import Mechanism
     from screwkin.mechanism.quantities import network_matrix, secondary_rates, virtual_motion
     from screwkin.mechanism.singularity import singularity_report
+    from screwkin.mechanism.tip_motion import joint_rates
     from screwkin.model.library import robot_names
     from screwkin.model.robot import Robot
     from screwkin.model.state import State, home
@@ -52,6 +53,7 @@ _HOMES = {
     "mechanism.mechanism": "Mechanism",
     "mechanism.quantities": "network_matrix secondary_rates virtual_motion",
     "mechanism.singularity": "singularity_report",
+    "mechanism.tip_motion": "joint_rates",
     "model.library": "robot_names",
     "model.robot": "Robot",
     "model.state": "State home",
@@ -80,6 +82,7 @@ __all__ = [
     "home",
     "inverse_dynamics",
     "jacobian",
+    "joint_rates",
     "limb_ik",
     "link_poses",
     "load_gait",

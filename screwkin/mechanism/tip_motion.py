@@ -64,6 +64,16 @@ def joint_rates(
     Raises:
         InputError: the tips' motion does not determine all joints, or a tip's twist is missing.
         ShapeError: a wrong shape, NaN or infinity, or a base pose that is not rigid.
+
+    Example:
+        >>> import numpy as np
+        >>> import screwkin as sk
+        >>> robot = sk.load_robot(sk.robot_names()[0])
+        >>> still = dict.fromkeys([limb.tip for limb in robot.limbs], np.zeros(6))
+        >>> forward = np.array([0.0, 0.0, 0.0, 0.1, 0.0, 0.0])      # the base by 0.1 m/s, the tips stay
+        >>> qd = sk.joint_rates(robot, sk.home(robot), forward, still)
+        >>> qd.shape == (len(robot.joints),)
+        True
     """
     limbs = _all_limbs(robot)
     for limb in limbs:
