@@ -86,6 +86,7 @@ def test_damaged_logs_are_refused_by_what_is_wrong(change, word, tmp_path):
         load_bench_log(path)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not REAL, reason="SCREWKIN_SERVO_LOGS names no folder of bench logs")
 def test_half_of_the_real_logs_fits_the_other_half_from_its_goals_alone():
     """XL330 at gains 100 to 800 by one set of figures; logs: the source of the model's figures."""
