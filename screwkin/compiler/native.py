@@ -99,14 +99,14 @@ class Native:
         method, outputs = _builtins(), self.program.outputs[:-1]
         if method is None or len(self.program.inputs) + len(outputs) > calls.MOST:
             return lambda *arrays: None
-        return calls.checked(method, self._plan(outputs, limit), outputs, allocate)
+        return calls.checked_call(method, self._plan(outputs, limit), outputs, allocate)
 
     def _plan(self, outputs: Sequence[Group], limit: float | None) -> bytes:
         many, one = (_addressof(function) for function in (self.many, self.one))
         cores = self.cores or _cores()
         inputs = self.program.inputs
         first = shared_from(self.program)
-        return calls.plan(many, one, inputs, outputs, cores=cores, shared_from=first, limit=limit)
+        return calls.call_plan(many, one, inputs, outputs, cores=cores, shared_from=first, limit=limit)
 
 
 def shared_from(program: Program) -> int:
