@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
 from typing import Any, TypeVar
 
-from screwkin.sim.self_collision import deepest
+from screwkin.sim.self_collision import SelfCollision, deepest
 
 V = TypeVar("V", bound=Any)
 """A ``Validation``, or any record with its measured fields."""
@@ -60,7 +60,7 @@ def agreed(checks: Sequence[V]) -> V:
         engines=_joined(values["engines"]),
         solver=_joined(solvers) if solvers else None,
         undecided=any(values["undecided"]),
-        self_collisions=deepest(one for own in values["self_collisions"] for one in own or ()),
+        self_collisions=_collided(values["self_collisions"]),
     )
 
 
@@ -96,6 +96,12 @@ def settled(check: V, finer: Mapping[str, V], reasons_of: Callable[[V], Sequence
     ranges = ", ".join(f"{name} {v[0]:.2f} to {v[1]:.2f}" for name, v in spread.items() if v is not None)
     reason = f"undecided: the verdict lies within the solver's own scatter ({said}; {ranges})"
     return replace(check, solver=record, undecided=True, passed=False, reasons=(reason, *check.reasons))
+
+
+def _collided(every: Sequence[Sequence[SelfCollision] | None]) -> tuple[SelfCollision, ...] | None:
+    """The deepest of all engines; None where one of them has not looked."""
+    looked = [own for own in every if own is not None]
+    return deepest(one for own in looked for one in own) if len(looked) == len(every) else None
 
 
 def _is_data(column: Sequence[Any]) -> bool:

@@ -91,7 +91,9 @@ def call_plan(
     return struct.pack(f"PPd{len(numbers)}n", many, one, limit or 0.0, *numbers)
 
 
-def checked_call(method: Any, plan: bytes, outputs: Sequence[Group], allocate: Allocate) -> Callable[..., Any]:
+def checked_call(
+    method: Any, plan: bytes, outputs: Sequence[Group], allocate: Allocate
+) -> Callable[..., Any]:
     """A function of arrays (*batch, *shape): a tuple of outputs, or None, see ``calls.c``."""
     shapes = tuple(group.shape for group in outputs)
     return _builtin(method(0), (plan, np.ndarray, np.dtype(float), float, np.empty, shapes, allocate))

@@ -161,3 +161,10 @@ def test_a_walk_passes_at_every_setting_of_the_solver(robot: sk.Robot, walk: sk.
     assert len(check.solver["mujoco"]["passed"]) == 3
     assert np.all(np.diff(shares) > 0)
     assert shares[-1] <= 1.0
+
+
+def test_self_collisions_that_one_engine_did_not_look_for_are_unknown(perfect: Validation) -> None:
+    one, other = named(perfect, "pybullet"), named(perfect, "mujoco")
+    assert agreed([one, other]).self_collisions == ()
+    assert agreed([one, replace(other, self_collisions=None)]).self_collisions is None
+    assert agreed([replace(one, self_collisions=None), other]).self_collisions is None
