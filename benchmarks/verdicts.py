@@ -17,6 +17,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from random import Random
 
 import screwkin as sk
 from benchmarks.environments import ROOT
@@ -172,6 +173,7 @@ def main(arguments: list[str] | None = None) -> int:
     finished = asked.output / "verdicts.jsonl"
     rows = [row for row in done(finished) if row.walk in wanted]
     left = [walk for walk in wanted if walk not in {row.walk for row in rows}]
+    Random(0).shuffle(left)  # whatever part is done is of all kinds
     with ProcessPoolExecutor(asked.jobs) as pool, finished.open("a", encoding="utf-8") as file:
         for k, job in enumerate(as_completed([pool.submit(outcomes, walk) for walk in left])):
             rows += (own := job.result())
