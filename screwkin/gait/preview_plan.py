@@ -21,7 +21,7 @@ from screwkin.gait.balance import ground_reaction
 from screwkin.gait.footsteps import Foothold, footholds, swing_side
 from screwkin.gait.motion import Motion, along
 from screwkin.gait.path import path_of
-from screwkin.gait.plan import Plan, check_rate, plan_around, whole_steps
+from screwkin.gait.plan import Plan, check_fitted, check_rate, plan_around, whole_steps
 from screwkin.gait.preview import CartMotion, follow_reference, preview_gains
 from screwkin.gait.realise import differentiate, positions
 from screwkin.gait.record import Gait
@@ -55,6 +55,7 @@ def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -
         GaitError: a setting is missing or wrong. NoSolutionError: out of reach, or feet that overlap.
     """
     steps = whole_steps(steps)
+    check_fitted(gait)
     settings = _settings(gait)
     check_rate(gait)
     count = round((steps + 2) * gait.Tc * gait.rate)

@@ -10,6 +10,7 @@ from screwkin.errors import expect
 from screwkin.files import text_sha256, versions
 from screwkin.gait.balance import ground_margin, ground_reaction, soles_on_floor
 from screwkin.gait.driven import driven
+from screwkin.gait.lengths import fitted
 from screwkin.gait.plan import Plan, plan
 from screwkin.gait.preview_plan import preview_plan
 from screwkin.gait.realise import differentiate, positions
@@ -53,6 +54,7 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
     expect(robot, Robot, "robot", 'load_robot("NAME")')
     expect(gait, Gait, "gait", 'load_gait("NAME")')
     table = robot_text(robot)
+    gait = fitted(gait, robot)
     steps = gait.steps if steps is None else steps
     whole = stance_of(robot)
     drive = driven(robot)
