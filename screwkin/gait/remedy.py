@@ -90,21 +90,23 @@ class _Trial:
 
 
 def _legs(trial: _Trial, limb: str) -> Iterator[str]:
-    """What to change so that the legs can follow: one key, or several where none works by itself."""
-    gait = trial.gait
+    """What to change so that the legs can follow: one of several keys, or all where none works by itself."""
+    gait, found = trial.gait, 0
     moves = {key: 0.0 for key in ("stride", "side", "turn") if getattr(gait, key)}
-    if trial.reached([{**moves, "lift": 0.1 * gait.lift, "sway": 0.0}])[0]:  # it stands
-        for key, easy in {**moves, "spread": 0.0, "lift": 0.1 * gait.lift, "sway": 0.0}.items():
-            if (good := trial.value(key, easy)) is not None:
-                yield f"{key} {getattr(gait, key):g} is too {_TOO[key]}: {good:g} works"
-                return
+    others = {"lift": 0.1 * gait.lift, "sway": 0.0, "spread": 0.0}
+    stands = trial.reached([{**moves, "lift": others["lift"], "sway": 0.0}])[0]
+    for key, easy in {**moves, **others}.items():
+        tried = stands if key in moves else not found
+        if tried and (good := trial.value(key, easy)) is not None:
+            found += 1
+            yield f"{key} {getattr(gait, key):g} is too {_TOO[key]}: {good:g} works"
     if not limb and (good := trial.value("spread", gait.spread + 0.5 * trial.lengths["hip"])) is not None:
+        found += 1
         yield f"spread {gait.spread:g} is too narrow: {good:g} works"
-    elif sentence := _height(trial, limb):
+    if limb and (sentence := _height(trial, limb)):
+        found += 1
         yield sentence
-    elif (good := trial.value("spread", 0.0)) is not None:
-        yield f"spread {gait.spread:g} is too wide: {good:g} works"
-    else:
+    if not found:
         yield from _together(trial, moves)
 
 
