@@ -6,17 +6,15 @@ from pathlib import Path
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, pose_from_array, unstack
-from screwkin.errors import expect
+from screwkin.errors import NoSolutionError, expect
 from screwkin.files import text_sha256, versions
 from screwkin.gait.balance import ground_margin, ground_reaction, soles_on_floor
-from screwkin.gait.driven import driven
-from screwkin.gait.plan import Plan, plan
-from screwkin.gait.preview_plan import preview_plan
-from screwkin.gait.realise import differentiate, positions
+from screwkin.gait.follow import follow
+from screwkin.gait.lengths import fitted
+from screwkin.gait.plan import Plan
 from screwkin.gait.record import Gait
-from screwkin.gait.stance import stance_of
+from screwkin.gait.remedy import with_remedy
 from screwkin.kinematics.positions import link_displacements, pose_in_base
-from screwkin.mechanism.choice import closed_mechanism
 from screwkin.mechanism.rates import block_names
 from screwkin.model.library import ROBOTS, data_folder
 from screwkin.model.robot import Robot, robot_text
@@ -40,7 +38,8 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
         largest closure error.
 
     Raises:
-        UnreachableError, SingularError, LimitError: names limb, sample and time.
+        UnreachableError, SingularError, LimitError: names limb, sample and time, and the keys of the gait
+            with values that work.
         GaitError, InputError: the gait does not fit the robot.
 
     Example:
@@ -53,17 +52,14 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
     expect(robot, Robot, "robot", 'load_robot("NAME")')
     expect(gait, Gait, "gait", 'load_gait("NAME")')
     table = robot_text(robot)
+    gait = fitted(gait, robot)
     steps = gait.steps if steps is None else steps
-    whole = stance_of(robot)
-    drive = driven(robot)
-    mechanism, stance = closed_mechanism(drive.moving), drive.stance(whole)
-    if gait.kind == "preview":
-        planned = preview_plan(mechanism, gait, stance, steps)
-    else:
-        planned = plan(gait, stance, steps)
-    solution = positions(mechanism, planned)
-    motion = differentiate(mechanism, planned, solution.state)
-    q, qd, qdd = drive.positions(solution.state.q), drive.rates(motion.qd), drive.rates(motion.qdd)
+    try:
+        done = follow(robot, gait, steps)
+    except NoSolutionError as error:
+        raise with_remedy(error, robot, gait, steps) from None
+    drive, planned, motion = done.drive, done.planned, done.motion
+    q, qd, qdd = drive.positions(done.solution.state.q), drive.rates(motion.qd), drive.rates(motion.qdd)
     tip_poses = _tip_poses(robot, planned, q)
     zmp, com, wrench, _ = ground_reaction(
         robot, planned.T_world_base, q, qd, qdd, planned.base_twist, planned.base_acceleration
@@ -94,8 +90,8 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
             "gait": gait.to_dict(),
             "steps": steps,
             "boundaries": planned.boundaries.tolist(),
-            "closure": float(solution.residual.max()),
-            "sigma": dict(zip(block_names(mechanism), motion.sigma.min(axis=0).tolist(), strict=True)),
+            "closure": float(done.solution.residual.max()),
+            "sigma": dict(zip(block_names(done.mechanism), motion.sigma.min(axis=0).tolist(), strict=True)),
             "notes": [*planned.notes, *drive.notes],
             "versions": versions(*TRACED),
             "command": command,
