@@ -18,7 +18,7 @@ from screwkin.gait.driven import Driven, driven
 from screwkin.gait.plan import Plan, plan
 from screwkin.gait.preview_plan import preview_plan
 from screwkin.gait.reach import on_other_branch
-from screwkin.gait.realise import targets_of
+from screwkin.gait.realise import free_rotations, targets_of
 from screwkin.gait.record import Gait
 from screwkin.gait.stance import Stance, stance_of
 from screwkin.ik.numeric import IkSettings
@@ -72,10 +72,11 @@ def _solved(drive: Driven, mechanism: Mechanism, plans: Sequence[Plan]) -> list[
     every = [{"base": planned.T_world_base, **targets_of(mechanism, planned)} for planned in plans]
     targets = {name: np.concatenate([one[name] for one in every]) for name in every[0]}
     start = State(targets["base"], np.array(robot.posture("home").q))
-    solution = solve_pose(robot, targets, start, settings=_ONE_START)
+    free = free_rotations(mechanism)
+    solution = solve_pose(robot, targets, start, settings=_ONE_START, free=free)
     good = (solution.status == Status.CONVERGED).all(axis=-1)
     for limb in robot.limbs:
-        good &= ~on_other_branch(robot, targets, solution, limb)
+        good &= ~on_other_branch(robot, targets, solution, limb, free)
     cuts = np.cumsum([len(planned.time) for planned in plans])[:-1]
     parts = zip(plans, np.split(good, cuts), np.split(solution.state.q, cuts), strict=True)
     return [Coarse(planned.time, drive.positions(q), bool(ok.all())) for planned, ok, q in parts]

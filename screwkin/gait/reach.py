@@ -22,6 +22,7 @@ from screwkin.kinematics.positions import (
     pose_in_base,
     successive_displacement,
 )
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.model.robot import Limb, Robot
 from screwkin.model.state import State
 
@@ -37,8 +38,35 @@ _FREEDOMS = (
 )
 
 
+Free = Mapping[str, tuple[str, ...]]
+"""By tip, the rotations of its virtual chain that follow."""
+
+
+def refuse_turns(robot: Robot, plan: Plan, free: Free) -> None:
+    """Raise where a plan turns feet about the vertical whose limbs have no joint for it.
+
+    Args:
+        robot: the robot.
+        plan: what it is to follow.
+        free: rotations of tips that follow.
+
+    Raises:
+        UnreachableError: names limb, sample and time, and what to change.
+    """
+    for foot in plan.feet:
+        R = plan.T_world_tip[foot][:, :2, 0]
+        turned = np.flatnonzero(np.abs(R[:, 0] * R[0, 1] - R[:, 1] * R[0, 0]) > _MISSING)
+        if "rz" in free.get(foot, ()) and len(turned):
+            limb, sample = robot.limb(foot), int(turned[0])
+            joints = ", ".join(robot.joints[i].name for i in robot.path_to(limb.link))
+            when = f"{limb.name}, sample {sample} (t = {float(plan.time[sample]):.3f} s)"
+            missing = f"no joint of {limb.name} ({joints}) turns {foot} about the vertical"
+            advice = f"straight and sideways walks do not; set turn = 0 (now {plan.gait.turn:.3g} rad)"
+            raise UnreachableError(f"{when}: {missing}; a turn needs one, {advice}", limb.name, sample)
+
+
 def refuse_unreachable(
-    robot: Robot, plan: Plan, targets: Mapping[str, Array], solution: PoseSolution
+    robot: Robot, plan: Plan, targets: Mapping[str, Array], solution: PoseSolution, free: Free
 ) -> None:
     """Raise for the first sample that a robot cannot follow.
 
@@ -47,6 +75,7 @@ def refuse_unreachable(
         plan: what it is to follow.
         targets: world poses (T, 4, 4) or positions (T, 3) of the tips, by name.
         solution: of these targets.
+        free: rotations of tips that follow.
 
     Raises:
         UnreachableError, SingularError, LimitError: name limb, sample and time.
@@ -61,11 +90,11 @@ def refuse_unreachable(
             raise UnreachableError(f"{when}: {missing}", limb.name, sample) from None
         raise
     for limb in robot.limbs:
-        _refuse_other_branch(robot, plan, targets, solution, limb)
+        _refuse_other_branch(robot, plan, targets, solution, limb, free)
 
 
 def on_other_branch(
-    robot: Robot, targets: Mapping[str, Array], solution: PoseSolution, limb: Limb
+    robot: Robot, targets: Mapping[str, Array], solution: PoseSolution, limb: Limb, free: Free
 ) -> NDArray[np.bool_]:
     """Samples (T,) in which a limb stands beyond a singular posture, where only limits can have put it.
 
@@ -77,14 +106,18 @@ def on_other_branch(
         targets: world poses (T, 4, 4) or positions (T, 3) of the tips, by name.
         solution: of these targets.
         limb: one of the robot's.
+        free: rotations of tips that follow.
     """
     path, target = list(robot.path_to(limb.link)), targets.get(limb.tip)
     q = np.reshape(solution.state.q, (-1, len(robot.joints)))
     posed = target is not None and target.shape[-2:] == (4, 4)
-    if target is None or len(path) != (6 if posed else 3):
+    chain = SerialChain.of(robot, limb.name, free.get(limb.tip, ()) if posed else ())
+    if target is None or len(chain.joints) != (6 if posed else 3):
         return np.zeros(len(q), dtype=bool)
     q = np.concatenate([np.array(robot.posture("home").q, dtype=float)[None], q])
-    screws, thetas = [robot.joints[i].screw for i in path], unstack(q[:, path])
+    virtual = np.zeros((len(q), len(chain.joints) - len(path)))
+    screws, thetas = [robot.joints[i].screw for i in path], unstack(np.hstack([q[:, path], virtual]))
+    screws += chain.screws[len(path) :]
     tip = successive_displacement(screws, thetas, A_ref_k=limb.frame).p
     columns = [as_array(at(tip, column), (len(q),)) for column in chain_jacobian(screws, thetas)]
     sense = np.linalg.det(np.stack(columns, axis=-1)[:, slice(0 if posed else 3, 6)])
@@ -93,21 +126,21 @@ def on_other_branch(
 
 
 def _refuse_other_branch(
-    robot: Robot, plan: Plan, targets: Mapping[str, Array], solution: PoseSolution, limb: Limb
+    robot: Robot, plan: Plan, targets: Mapping[str, Array], solution: PoseSolution, limb: Limb, free: Free
 ) -> None:
     """Refuse samples on another branch than home's.
 
     Raises:
         LimitError: names limb, sample and time, and the joint that meets its limit on the way.
     """
-    other = np.flatnonzero(on_other_branch(robot, targets, solution, limb))
+    other = np.flatnonzero(on_other_branch(robot, targets, solution, limb, free))
     if not len(other):
         return
     path, start = list(robot.path_to(limb.link)), np.array(robot.posture("home").q, dtype=float)
-    sample, free = int(other[0]), [replace(j, lower=-np.inf, upper=np.inf) for j in robot.joints]
+    sample, wide = int(other[0]), [replace(j, lower=-np.inf, upper=np.inf) for j in robot.joints]
     one = {name: target[sample] for name, target in targets.items()}
-    unlimited = replace(robot, joints=tuple(free))
-    near = solve_pose(unlimited, one, State(plan.T_world_base[sample], start)).state.q
+    unlimited = replace(robot, joints=tuple(wide))
+    near = solve_pose(unlimited, one, State(plan.T_world_base[sample], start), free=free).state.q
     beyond = [max(robot.joints[i].lower - near[i], near[i] - robot.joints[i].upper) for i in path]
     worst = path[int(np.argmax(beyond))]
     joint = robot.joints[worst]

@@ -12,7 +12,7 @@ from screwkin.algebra.se3 import (
     vector_from_array,
 )
 from screwkin.gait.plan import Plan
-from screwkin.gait.reach import refuse_unreachable
+from screwkin.gait.reach import refuse_turns, refuse_unreachable
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.pose import solve_pose
 from screwkin.ik.pose_solution import PoseSolution
@@ -45,9 +45,23 @@ def positions(
     robot = mechanism.robot
     start = np.array(robot.posture("home").q) if guess is None else guess
     targets = {"base": planned.T_world_base, **targets_of(mechanism, planned)}
-    solution = solve_pose(robot, targets, State(planned.T_world_base, start), settings=settings)
-    refuse_unreachable(robot, planned, targets, solution)
+    free = free_rotations(mechanism)
+    refuse_turns(robot, planned, free)
+    solution = solve_pose(robot, targets, State(planned.T_world_base, start), settings=settings, free=free)
+    refuse_unreachable(robot, planned, targets, solution, free)
     return solution
+
+
+def free_rotations(mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
+    """By tip, the rotations of its virtual chain that follow."""
+    free = {
+        chain.name: tuple(
+            c for c in chain.couplings if c[0] == "r" and f"{chain.name}.{c}" in mechanism.secondary
+        )
+        for chain in mechanism.chains
+        if chain.limb is not None
+    }
+    return {tip: rotations for tip, rotations in free.items() if rotations}
 
 
 def targets_of(mechanism: Mechanism, planned: Plan) -> dict[str, Array]:

@@ -39,9 +39,7 @@ def with_remedy(error: NoSolutionError, robot: Robot, gait: Gait, steps: int) ->
     """
     trial = _Trial(robot, gait, steps)
     limb = getattr(error, "limb", "")
-    arm = limb and robot.limb(limb).kind != "leg"
-    sentences = [*(_hands(trial) if arm else _legs(trial, limb))]
-    error.args = (f"{error}. {'; or '.join(sentences) or _unknown(gait)}", *error.args[1:])
+    error.args = (f"{error}. {'; or '.join(_legs(trial, limb)) or _unknown(gait)}", *error.args[1:])
     return error
 
 
@@ -141,16 +139,6 @@ def _together(trial: _Trial, moves: Mapping[str, float]) -> Iterator[str]:
         now = ", ".join(f"{key} {getattr(gait, key):g}" for key in good)
         listed = ", ".join(f"{key} {value:g}" for key, value in good.items())
         yield f"{now} do not fit together: {listed} work"
-
-
-def _hands(trial: _Trial) -> Iterator[str]:
-    """What to change so that the arms can follow."""
-    now, home = trial.gait.hand_drop, trial.lengths["arm"]
-    several = sorted(home * np.linspace(0.4, 1.0, _VALUES), key=lambda drop: abs(drop - now))
-    good = trial.first([{"hand_drop": float(f"{drop:.3g}")} for drop in several if drop > 0])
-    if good is not None:
-        word, works = "more" if now > good["hand_drop"] else "less", good["hand_drop"]
-        yield f"hand_drop {now:g} is {word} than the arms allow (at home {home:.3g}): {works:g} works"
 
 
 def _unknown(gait: Gait) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 
 import numpy as np
@@ -80,9 +81,14 @@ def test_a_gait_that_stoops_too_low_names_the_key_to_change() -> None:
     assert sk.walk(robot_of(LONG_LEGS), higher, 2).samples > 2
 
 
-def test_hands_out_of_reach_name_their_key() -> None:
-    low = sk.load_gait("walk").replace(rate=10, hand_drop=0.3)
-    with pytest.raises(
-        UnreachableError, match=r"hand_drop 0\.3 is more than the arms allow \(at home 0\.113\): 0\.113 works"
-    ):
-        sk.walk(robot_of(BIOLOID), low, 2)
+def test_hands_out_of_reach_rest_and_name_their_key() -> None:
+    low = sk.walk(robot_of(BIOLOID), sk.load_gait("walk").replace(rate=10, hand_drop=0.3), 2)
+    remark = r"right_arm rests: .* out of reach by .*; hand_drop is 0\.3, at home 0\.113"
+    assert any(re.match(remark, note) for note in low.meta["notes"])
+    assert low.meta["at_rest"] == ["right_arm", "left_arm"]
+    arms = [i for i, name in enumerate(low.joint_names) if "shoulder" in name or "elbow" in name]
+    np.testing.assert_array_equal(
+        low.q[:, arms], np.tile(sk.home(robot_of(BIOLOID)).q[arms], (low.samples, 1))
+    )
+    legs = [i for i in range(18) if i not in arms]
+    np.testing.assert_array_equal(low.q[:, legs], walked(BIOLOID, "walk").q[:, legs])

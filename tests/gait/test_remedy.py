@@ -39,7 +39,6 @@ def refused(robot: str, gait: str, changes: dict[str, float]) -> str:
     ("robot", "gait", "changes", "key"),
     [
         ("bioloid", "walk", {"stride": 0.5}, "stride"),
-        ("bioloid", "walk", {"hand_drop": 0.3}, "hand_drop"),
         pytest.param("bioloid", "walk", {"turn": 1.2}, "turn", marks=pytest.mark.slow),
         pytest.param("poppy12", "walk", {}, "waist_height", marks=pytest.mark.slow),
     ],
