@@ -12,7 +12,7 @@ from screwkin.algebra.se3 import IDENTITY, Pose
 from screwkin.errors import InputError, UnknownNameError, expect, one_of
 from screwkin.model.changes import changed_text, check_followed
 from screwkin.model.display import figure, html_table, listing
-from screwkin.model.inertias import broken_triangle
+from screwkin.model.inertias import impossible
 from screwkin.model.reading import read_table
 from screwkin.model.record_faults import check_records, vars_of
 from screwkin.model.records import (
@@ -267,7 +267,7 @@ class Robot(RobotRecord):
         def raised(link: Link) -> Link:
             i = link.inertia
             raised = Inertia(max(i.xx, inertia), max(i.yy, inertia), max(i.zz, inertia), i.xy, i.xz, i.yz)
-            if broken_triangle(raised):  # a sphere added keeps principal moments those of a body
+            if impossible(raised):  # a sphere added keeps principal moments those of a body
                 more = max(0, inertia - min(i.xx, i.yy, i.zz))
                 raised = Inertia(i.xx + more, i.yy + more, i.zz + more, i.xy, i.xz, i.yz)
             return replace(link, mass=max(link.mass, mass), inertia=raised)

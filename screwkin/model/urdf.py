@@ -27,7 +27,7 @@ from screwkin.algebra.se3 import (
 )
 from screwkin.errors import InputError
 from screwkin.model.inertias import (
-    broken_triangle,
+    impossible,
     inertia_from_matrix,
     inertia_matrix,
     is_flat,
@@ -149,7 +149,7 @@ def _mujoco_options(robot: Robot) -> dict[str, str]:
     for link in robot.links:
         if link.name != robot.base_link and (link.mass == 0 or is_flat(link.inertia)):
             options |= _BOUNDS
-        if broken_triangle(link.inertia):
+        if impossible(link.inertia):
             options["balanceinertia"] = "true"
     return options
 
