@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any, Self
 
 from screwkin.algebra.scalar import Scalar, is_symbolic
@@ -120,7 +121,10 @@ class Robot(RobotRecord):
         for what, wanted in wishes.items():
             expect(wanted, Mapping, what, "values by the name of their link or joint")
         text = changed_text(self, robot_text(self), name, parameters, wishes)
-        robot = self.from_text(text, f"<{self.name}, changed>", self.is_symbolic)
+        origin = f"<{self.name}, changed>"
+        if self.path and any(shape.file for link in self.links for shape in link.shapes):
+            origin = str(Path(self.path).with_name(origin))  # where its meshes are named from
+        robot = self.from_text(text, origin, self.is_symbolic)
         check_followed(robot, wishes)
         return robot
 

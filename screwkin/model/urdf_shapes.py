@@ -1,4 +1,4 @@
-"""What the links of a URDF file look like and occupy: boxes for contact, and all other shapes beside them."""
+"""What the links of a URDF file look like and occupy, in and out: boxes for contact, and all other shapes."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 
 from screwkin.algebra.se3 import Pose, as_array, leaves, vector_from_array
-from screwkin.model.mesh_files import find_mesh
+from screwkin.model.mesh_files import find_mesh, short_path
 from screwkin.model.records import Box, Shape, ShapeRole
 from screwkin.model.urdf_xml import Element, Reader
 
@@ -117,6 +118,31 @@ def _numbers(text: str, count: int) -> tuple[float, ...]:
     except ValueError:
         return ()
     return numbers if len(numbers) == count and all(map(math.isfinite, numbers)) else ()
+
+
+def add_geometry(element: ElementTree.Element, shape: Shape, folder: Path | None) -> None:
+    """Write what a shape is into its element, ``visual`` or ``collision``.
+
+    Args:
+        element: of the shape.
+        shape: of numbers.
+        folder: of the file that is written; None to name meshes by their whole paths.
+    """
+    size = [repr(float(number)) for number in shape.size]
+    if shape.kind == "mesh":
+        given = {
+            "filename": short_path(shape.file, folder) if folder else shape.file,
+            "scale": " ".join(size),
+        }
+    elif shape.kind == "box":
+        given = {"size": " ".join(size)}
+    else:
+        given = dict(zip(_KEYS[shape.kind], size, strict=True))
+    ElementTree.SubElement(ElementTree.SubElement(element, "geometry"), shape.kind, given)
+    if shape.colour:
+        rgb = [repr(float(c)) for c in shape.colour]
+        material = ElementTree.SubElement(element, "material", name="_".join(["rgb", *rgb]))
+        ElementTree.SubElement(material, "color", rgba=" ".join([*rgb, "1.0"]))
 
 
 def _is_straight(shape: Shape) -> bool:
