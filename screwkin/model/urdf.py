@@ -87,11 +87,12 @@ def tip_and_sole_frames(robot: Robot) -> Mapping[str, tuple[str, Pose]]:
 
 
 def link_colours(robot: Robot) -> Mapping[str, Colour]:
-    """White base; outwards along a limb, the bodies with boxes alternate between slate and orange."""
+    """White base; outwards along a limb, bodies with boxes or shapes alternate between slate and orange."""
     depth = {robot.base_link: 0}
     for i in robot.traversal:
         joint = robot.joints[i]
-        depth[joint.child] = depth[joint.parent] + bool(robot.link(joint.child).boxes)
+        link = robot.link(joint.child)
+        depth[joint.child] = depth[joint.parent] + bool(link.boxes or link.shapes)
     colours = {name: (SLATE if level % 2 else ORANGE) for name, level in depth.items()}
     return {**colours, robot.base_link: WHITE}
 
