@@ -20,17 +20,17 @@ from screwkin.algebra.screws import INFINITE, Screw
 from screwkin.algebra.se3 import IDENTITY, Pose, as_array, vector_from_array
 from screwkin.errors import TableError
 from screwkin.model.inertias import (
-    broken_triangle,
+    impossible,
     inertia_from_matrix,
     inertia_matrix,
     nearest_body,
-    negative_moments,
     without_noise,
 )
-from screwkin.model.records import Box, Inertia, Joint, Link, RobotRecord
+from screwkin.model.records import Box, Inertia, Joint, Link, RobotRecord, Shape
 from screwkin.model.robot import Robot
 from screwkin.model.toml import read_text
 from screwkin.model.toml_out import robot_toml
+from screwkin.model.urdf_shapes import shape_reader
 from screwkin.model.urdf_xml import (
     TYPES,
     Edge,
@@ -45,15 +45,13 @@ from screwkin.model.urdf_xml import (
 )
 
 _UNLIMITED = 1e9  # written by programs that have no word for infinity, this one among them
-_WHOLE = 1e-9  # how far a turned box may be from the base axes
 _KEPT = {
     "robot": {"link", "joint", "material"},
     "joint": {"origin", "parent", "child", "axis", "limit", "mimic"},
 }
 _NO_NAME = re.compile(r"[^A-Za-z0-9_-]+")
-_IMPOSSIBLE = "inertia read as it stands though no body has it (to repair: convert --repair)"
+_IMPOSSIBLE = "inertia read as it stands, though no body has it (to repair: convert --repair)"
 _REPAIRED = "inertia that no body has, replaced by the nearest that one can have"
-_BOXES_ONLY = "left out, as only boxes along the axes stay for contact"
 
 
 @dataclass(frozen=True)
@@ -100,11 +98,13 @@ def parse_urdf(text: str, path: str = "<text>", repair: bool = False, mimic: Mim
     if reader.faults:
         raise TableError(path, reader.faults)
     _note_left_out(reader, root, joints)
-    names = _unique_names(reader, links)
+    names, shapes = _unique_names(reader, links), shape_reader(reader, root, Path(path).parent)
     bodies = _bodies(base, joints, names)
     for name, element in links.items():
         _add_mass(reader, bodies[name], name, element, repair)
-        _add_boxes(reader, bodies[name], name, element)
+        boxes, others = shapes.shapes(name, element, bodies[name].poses[name])
+        bodies[name].boxes += boxes
+        bodies[name].shapes += others
     moving = [edge for edge in joints if edge.type != "fixed"]
     rows = [_joint(reader, edge, bodies[edge.parent], bodies[edge.child]) for edge in moving]
     whole = list({id(bodies[name]): bodies[name] for name in links}.values())
@@ -129,12 +129,8 @@ def parse_urdf(text: str, path: str = "<text>", repair: bool = False, mimic: Mim
 def _audit_bodies(
     reader: Reader, bodies: Sequence[_Body], parts: Sequence[Link], base: str, names: Mapping[str, str]
 ) -> None:
-    """Negative moments of a whole body are faults; moving without mass, and merged links, are remarks."""
+    """Moving without mass, and merged links, are remarks."""
     for body, part in zip(bodies, parts, strict=True):
-        if found := negative_moments(part.inertia):
-            row = f"<link> {', '.join(map(repr, body.negative)) or repr(body.name)}"
-            fix = "Write moments about the CoM in the axes of <inertial>, or repair it: convert --repair"
-            reader.fault(row, "inertia", found, fix)
         if len(body.poses) > 1:
             merged = [name for name in body.poses if names[name] != body.name]
             reader.note("merged, as fixed to one another", f"{' + '.join(merged)} into {body.name}")
@@ -152,17 +148,14 @@ def _note_left_out(reader: Reader, root: Element, joints: Iterable[Edge]) -> Non
 
 @dataclass
 class _Body:
-    """Links that fixed joints hold together: their poses, masses with CoM and inertia in base axes, boxes.
-
-    ``negative`` lists those with negative moments of inertia.
-    """
+    """Links that fixed joints hold together: poses, masses with CoM and inertia, boxes, shapes; base axes."""
 
     name: str
     frame: Pose
     poses: dict[str, Pose]
     masses: list[tuple[float, Array, Array]] = field(default_factory=list)
-    negative: list[str] = field(default_factory=list)
     boxes: list[Box] = field(default_factory=list)
+    shapes: list[Shape] = field(default_factory=list)
 
 
 def _bodies(base: str, joints: Sequence[Edge], names: Mapping[str, str]) -> dict[str, _Body]:
@@ -214,8 +207,6 @@ def _add_mass(reader: Reader, body: _Body, name: str, link: Element, repair: boo
     inertia = _audited(reader, name, Inertia(*moments), mass, repair)
     if mass > 0 and not inertia_matrix(inertia).any():
         reader.note("mass without inertia, taken as a point", name)
-    if negative_moments(inertia):
-        body.negative.append(name)
     R = as_array(here.R)
     body.masses.append((mass, as_array(here.p), R @ inertia_matrix(inertia) @ R.T))
 
@@ -225,30 +216,10 @@ def _audited(reader: Reader, name: str, inertia: Inertia, mass: float, repair: b
     clean = without_noise(inertia, mass)
     if clean is not inertia:
         reader.note("moments of inertia as small as rounding, taken as 0", name)
-    if found := negative_moments(clean) or broken_triangle(clean):
+    if found := impossible(clean):
         reader.note(_REPAIRED if repair else _IMPOSSIBLE, f"{name} has {found}")
         return nearest_body(clean) if repair else clean
     return clean
-
-
-def _add_boxes(reader: Reader, body: _Body, name: str, link: Element) -> None:
-    """Boxes of contact, or of pictures where there are none for contact."""
-    row = f"<link> {name!r}"
-    for shape in link.findall("collision") or link.findall("visual"):
-        geometry = shape.find("geometry")
-        for solid in () if geometry is None else geometry:
-            here = body.poses[name] @ reader.origin(row, shape)
-            turned = np.abs(as_array(here.R))
-            whole = np.round(turned)
-            if solid.tag != "box" or np.abs(turned - whole).max() > _WHOLE:
-                kind = "turned box" if solid.tag == "box" else solid.tag
-                reader.note(_BOXES_ONLY, f"{kind} of {name}")
-                continue
-            size = whole @ np.array(reader.numbers(row, solid, "size", (0.0, 0.0, 0.0)))
-            if (size <= 0).any():
-                reader.fault(row, "size", "is missing or not positive", "Write three edges in m")
-                continue
-            body.boxes.append(Box(here.p, vector_from_array(size)))
 
 
 def _link(body: _Body) -> Link:
@@ -262,7 +233,9 @@ def _link(body: _Body) -> Link:
         d = c - com
         total += inertia + m * (d @ d * np.eye(3) - np.outer(d, d))
     place = vector_from_array(com) if mass else body.frame.p
-    return Link(body.name, mass, place, inertia_from_matrix(total), body.frame, tuple(body.boxes))
+    return Link(
+        body.name, mass, place, inertia_from_matrix(total), body.frame, tuple(body.boxes), tuple(body.shapes)
+    )
 
 
 def _joint(reader: Reader, edge: Edge, parent: _Body, child: _Body) -> Joint:
@@ -302,6 +275,9 @@ def _bounds(reader: Reader, edge: Edge) -> tuple[float, float]:
         reader.note("one limit only, the other one read as 0, or as none beyond it", edge.name)
         if lower > upper:
             lower, upper = (lower, math.inf) if "lower" in given else (-math.inf, upper)
+    elif lower > upper:
+        reader.note("lower limit above the upper one, read as free", edge.name)
+        return -math.inf, math.inf
     elif lower == upper:
         reader.note("lower and upper limit are equal, so that it cannot move", edge.name)
     return (
