@@ -21,7 +21,7 @@ from screwkin.model.table import load_robot
 from screwkin.model.toml_out import robot_toml
 from screwkin.model.urdf import urdf_from_robot
 from screwkin.model.urdf_in import load_urdf
-from screwkin.model.urdf_xml import MIMICS, Mimic
+from screwkin.model.urdf_joints import MIMICS, Mimic
 
 _FRAMES = "URDF holds no limbs, postures and servos; tips and soles are frames fixed to their links"
 FORMATS = (".toml", ".urdf", ".csv")
@@ -43,9 +43,9 @@ def convert(
         str,
         typer.Option(
             metavar="HOW",
-            help="Coupled joints of a URDF to read: refuse them, or read them as free joints with a remark.",
+            help="Joints of a URDF that follow others: couple them, or read them as free joints.",
         ),
-    ] = "refuse",
+    ] = "couple",
     as_json: AsJson = False,
 ) -> int:
     """Convert a robot between screw tables (.toml), URDF (.urdf) and Denavit-Hartenberg tables (.csv).

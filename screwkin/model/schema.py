@@ -85,6 +85,14 @@ class LinkRow(Row):
     boxes: list[BoxRow] = Field([], description="[{ center = [x, y, z], size = [lx, ly, lz] }]")
 
 
+class MimicRow(Row):
+    """A coupling: position = ratio * that of another joint + offset."""
+
+    joint: Name = Field(description="name of the joint that it follows")
+    ratio: Value = Field(1.0, description="its rate per unit rate of that joint")
+    offset: Value = Field(0.0, description="its position where that joint is at 0, in rad or m")
+
+
 class JointRow(Row):
     """[[joint]]: a screw. Limits left out are no limits."""
 
@@ -99,6 +107,7 @@ class JointRow(Row):
     upper: Value = Field(math.inf, description="upper limit in rad or m")
     velocity: Positive = Field(math.inf, description="greatest speed in rad/s or m/s")
     effort: Positive = Field(math.inf, description="greatest torque or force in N m or N")
+    mimic: MimicRow | None = Field(None, description='{ joint = "leader", ratio = 1.0, offset = 0.0 }')
 
 
 class ClosureRow(Row):
@@ -164,6 +173,7 @@ _PARTS: Mapping[str, type[Row]] = {
     "frame_a": FrameRow,
     "frame_b": FrameRow,
     "boxes": BoxRow,
+    "mimic": MimicRow,
 }
 
 Kind = TypeVar("Kind", bound=Row)

@@ -14,7 +14,7 @@ from typing import Any
 from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.se3 import UNTURNED, ZERO, Pose, Rotation, Vector, leaves
 from screwkin.errors import InputError
-from screwkin.model.records import Joint, Limb, Link, Posture, RobotRecord, open_scalars
+from screwkin.model.records import CoupledJoint, Joint, Limb, Link, Posture, RobotRecord, open_scalars
 from screwkin.model.values import COUPLINGS
 
 _UNLIMITED = {"lower": -math.inf, "upper": math.inf, "velocity": math.inf, "effort": math.inf}
@@ -41,11 +41,11 @@ def table_data(robot: RobotRecord) -> dict[str, Any]:
         "base_link": robot.base_link,
         "base": robot.base,
     }
-    origins = {joint.child: joint.screw.s0 for joint in robot.joints}
+    origins = {joint.child: joint.screw.s0 for joint in robot.tree}
     data: dict[str, Any] = {
         "robot": {key: value for key, value in head.items() if value},
         "link": [_link(link, origins.get(link.name, ZERO)) for link in robot.links],
-        "joint": [_joint(joint) for joint in robot.joints],
+        "joint": [_joint(joint) for joint in robot.tree],
         "closure": [_row(closure) for closure in robot.closures],
         "limb": [_limb(limb) for limb in robot.limbs],
         "sole": [_row(sole) for sole in robot.soles],
@@ -109,7 +109,7 @@ def _link(link: Link, origin: Vector) -> dict[str, Any]:
 
 def _joint(joint: Joint) -> dict[str, Any]:
     screw = joint.screw
-    row = {
+    row: dict[str, Any] = {
         "name": joint.name,
         "parent": joint.parent,
         "child": joint.child,
@@ -120,7 +120,10 @@ def _joint(joint: Joint) -> dict[str, Any]:
     if joint.type == "helical" or (joint.type == "revolute" and screw.pitch != 0):
         row["pitch"] = screw.pitch
     limits = {key: getattr(joint, key) for key in _UNLIMITED}
-    return {**row, **{key: x for key, x in limits.items() if x != _UNLIMITED[key]}}
+    row |= {key: x for key, x in limits.items() if x != _UNLIMITED[key]}
+    if isinstance(joint, CoupledJoint):
+        row["mimic"] = {"joint": joint.leader, "ratio": joint.ratio, "offset": joint.offset}
+    return row
 
 
 def _limb(limb: Limb) -> dict[str, Any]:
