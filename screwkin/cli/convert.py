@@ -13,6 +13,7 @@ from screwkin.cli.options import AsJson
 from screwkin.cli.output import print_json, remark
 from screwkin.errors import InputError, one_of
 from screwkin.files import atomic_write
+from screwkin.model.coupled import coupling_text
 from screwkin.model.dh import CONVENTIONS, Convention
 from screwkin.model.dh_csv import dh_text, load_dh
 from screwkin.model.dh_robot import robot_from_dh
@@ -98,4 +99,6 @@ def _written(robot: Robot, suffix: str, convention: Convention) -> tuple[str, li
         ".urdf": [_FRAMES] if robot.limbs else [],
         ".csv": ["DH tables hold the chains' geometry only: no masses, limits, soles and closures"],
     }
+    if robot.coupled and suffix == ".csv":
+        lost[suffix].append(f"these joints are free in it: {', '.join(map(coupling_text, robot.coupled))}")
     return writers[suffix](), lost[suffix]

@@ -26,7 +26,12 @@ def mass_center(robot: Robot, displacements: Placements) -> Vector:
 
 
 def mass_center_velocities(robot: Robot, displacements: Placements, twists: Sequence[Twist]) -> list[Vector]:
-    """Velocity of the CoM per unit rate of each coordinate: its joints' subtrees' shares of the mass."""
+    """Velocity of the CoM per unit rate of each coordinate of q."""
+    return per_coordinate(robot, subtree_velocities(robot, displacements, twists))
+
+
+def subtree_velocities(robot: Robot, displacements: Placements, twists: Sequence[Twist]) -> list[Vector]:
+    """The same of each joint of ``robot.tree``: its subtree's share of the mass, on its screw."""
     mass: dict[str, Scalar] = {}
     moment: dict[str, Vector] = {}
     for link, D in zip(robot.links, displacements, strict=True):
@@ -41,4 +46,4 @@ def mass_center_velocities(robot: Robot, displacements: Placements, twists: Sequ
         # A subtree of mass m with first moment h moves its share by (m v + omega x h) / M.
         spin = at(moment[joint.child], Twist(twist.omega, twist.v * mass[joint.child]))
         columns.append(spin.v * (1 / robot.mass))
-    return per_coordinate(robot, columns)
+    return columns
