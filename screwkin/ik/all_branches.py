@@ -1,98 +1,47 @@
-"""All branches of six revolute joints without closed form, over arrays: elimination, then Newton's method.
+"""All branches of six revolute joints without closed form.
 
-Three programs for every batch: the equations' table, the determinant at seventeen angles of the given joint,
-and at every zero of it the limb's angles. Nothing depends on a guess, so what is no zero is no solution.
+Those of the nearest limb that has one, where the axes are parallel or meet but for tolerance, else those
+of an elimination; Newton's method on the limb itself makes them exact.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from functools import cache
-
 import numpy as np
 
-from screwkin.algebra.arrays import Array, Integers
-from screwkin.algebra.harmonics import TOUCH, cells, crossing, derivatives, equal_angles, harmonics
-from screwkin.algebra.scalar import Scalar, larger, least, where
-from screwkin.algebra.screws import at
-from screwkin.algebra.se3 import Pose, Twist, cross, unstack
+from screwkin.algebra.arrays import Array
 from screwkin.compiler.program import Program, Recorder
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.compiler.run import run
 from screwkin.ik.closed import EXACT, first_of_its_kind
-from screwkin.ik.elimination import ANGLES, BRANCHES, Elimination, eliminations, vanishing
+from screwkin.ik.eliminated import USABLE, eliminated, elimination, elimination_programs
+from screwkin.ik.elimination import BRANCHES
 from screwkin.ik.on_limits import on_limits
+from screwkin.ik.polish import iterated, steps
+from screwkin.ik.relative import relative
 from screwkin.ik.solutions import LimbSolutions, ordered
-from screwkin.ik.starts import spread
-from screwkin.kinematics.serial_chain import SerialChain, cached, forward, miss
-from screwkin.mechanism.limb_rates import pose_rates
+from screwkin.kinematics.serial_chain import SerialChain, cached, residual
 from screwkin.model.records import LIMIT_TOLERANCE
 
-BLOCK = 512
-"""Samples computed together, which bounds the memory of a large batch."""
-POSES = 24
-"""Poses at which the ways to eliminate are compared."""
-EXACT_ENOUGH = 1e-9
-"""Error of the given joint [rad], at nine of ten poses, with which a way is taken without trying others."""
-USABLE = 1e-5
-"""Median error [rad] above which no way serves: the determinant vanishes for all poses alike."""
-STEP = 1e-4
-"""Difference of angles [rad] from which the slope of the determinant is computed."""
-ROUNDING = 1e-15
-"""Rounding of the determinant over its largest value."""
-NEWTON = 2
-"""Newton steps of every branch: rounding in the elimination leaves some 1e-10, seldom 1e-4."""
-ROUGH = 1e-13
-"""Error of a branch [m and rad] that needs more steps; near a double root they are many."""
-NEAR = 1e-2
-"""Error above which a zero of the determinant is no solution."""
-ROUNDS = 12
-"""Bound on the rounds of Newton steps there."""
-LONGEST = 0.3
-"""Largest change of an angle in such a step [rad]."""
+FOLD = 0.01
+"""Slack of a relative's branches below which the limb's own may fall together elsewhere: a hundred times the
+largest difference of the two limbs, by which slack differs."""
+SIDE = 1e-3
+"""Step [rad] from which the curvature at a fold is computed."""
 
 
-@cached
-def elimination(chain: SerialChain) -> Elimination | None:
-    """The most exact way to eliminate for a limb, None where there is none."""
-    if len(chain.screws) != 6 or not chain.turning.all():
-        return None
-    low = np.where(np.isfinite(chain.lower), chain.lower, -np.pi)
-    high = np.where(np.isfinite(chain.upper), chain.upper, np.pi)
-    q = low + spread(6, POSES, 0) * (high - low)
-    tips, _ = forward(chain.screws, unstack(q), chain.tip)
-    best, least_error = None, USABLE
-    for way in eliminations(chain):
-        errors = _errors(way, tips, q)
-        if np.quantile(errors, 0.9) <= EXACT_ENOUGH:
-            return way
-        if np.median(errors) < least_error:
-            best, least_error = way, float(np.median(errors))
-    return best
+def has_branches(chain: SerialChain) -> bool:
+    """True if all branches of the limb can be computed, though it has no closed form."""
+    return relative(chain) is not None or elimination(chain, USABLE) is not None
 
 
-def _errors(way: Elimination, tips: Pose, q: Array) -> Array:
-    """How far zeros of the determinant are from the given joint's angles (B,), by value and slope there."""
-    D, x = way.displacement(tips), q[:, 5 - way.given if way.backwards else way.given]
-    table = np.array([[np.broadcast_to(entry, x.shape) for entry in part] for part in way.table(D)])
-    around = np.concatenate([equal_angles(ANGLES)[:, None] + 0 * x, [x, x + STEP, x - STEP]])
-    values = np.asarray(vanishing(list(_at(table.swapaxes(0, 1), around))))
-    here, after, before = values[ANGLES:]
-    scale = np.abs(values[:ANGLES]).max(axis=0) * ROUNDING
-    slope = np.abs(after - before) / (2 * STEP)
-    return (np.abs(here) + scale) / np.where(slope > 0, slope, 1e-300)
+def _by_relative(chain: SerialChain) -> bool:
+    return elimination(chain) is None and relative(chain) is not None
 
 
-def _at(table: Array, x: Array) -> Array:
-    """Matrices (54, ...) of the given joint's angles x (..., B) from their coefficients (54, 3, B)."""
-    fixed, cosine, sine = (table[:, k].reshape(len(table), *(1,) * (x.ndim - 1), -1) for k in range(3))
-    return np.asarray(fixed + np.cos(x) * cosine + np.sin(x) * sine)
-
-
-def eliminated_solutions(
+def branch_solutions(
     chain: SerialChain, target: Array, guess: Array, tolerances: tuple[float, float], batch: tuple[int, ...]
 ) -> LimbSolutions:
-    """All solutions of a limb that has an elimination, best first.
+    """All solutions of a limb that ``has_branches``, best first.
 
     Args:
         chain: of the limb.
@@ -101,167 +50,74 @@ def eliminated_solutions(
         tolerances: angle [rad] and distance [m] within which limits are preferred to an exact solution.
         batch: shape with B samples.
     """
-    q, error = branches(chain, target)
+    q, error = _near_relative(chain, target) if _by_relative(chain) else eliminated(chain, target)
+    iterated(chain, q, error, target)
     q = chain.wrapped(q)
-    owner, k = (error <= EXACT).nonzero()
     if max(tolerances) > LIMIT_TOLERANCE:
+        owner, k = (error <= EXACT).nonzero()
         q[owner, k] = on_limits(chain, q[owner, k], target[owner], tolerances)
     valid = first_of_its_kind(q, error)
     lost = np.flatnonzero(~valid.any(axis=1))
     k = error[lost].argmin(axis=1)
     q[lost, 0], error[lost, 0] = q[lost, k], error[lost, k]
-    steps = np.ones(valid.shape, dtype=int)
-    return ordered(chain, "elimination", q, valid, error, steps, guess, batch)
+    once = np.ones(valid.shape, dtype=int)
+    return ordered(chain, "branches", q, valid, error, once, guess, batch)
 
 
-def branches(chain: SerialChain, target: Array) -> tuple[Array, Array]:
-    """All branches of a limb that has an elimination.
+def _near_relative(chain: SerialChain, target: Array) -> tuple[Array, Array]:
+    """Branches (B, 16, 6) next to those of the limb's relative, and their error (B, 16)."""
+    out = run(relative_branches(chain), {"target": target})
+    near = out["q"]
+    count, k = near.shape[:2]
+    starts, present = np.tile(near, (1, 3, 1)), np.ones((count, 3 * k), dtype=bool)
+    folds = out["slack"] < FOLD
+    present[:, k:] = np.tile(folds, 2)
+    sample, row = folds.nonzero()
+    ahead, back = _both_sides(chain, near[sample, row], target[sample])
+    starts[sample, k + row], starts[sample, 2 * k + row] = ahead, back
+    q, error = starts, np.full(present.shape, np.inf)
+    sample, row = (present & np.isfinite(starts).all(axis=2)).nonzero()
+    polished = run(steps(chain), {"start": starts[sample, row], "target": target[sample]})
+    q[sample, row], error[sample, row] = polished["q"], polished["error"][:, 0]
+    first = np.argsort(error, axis=1, kind="stable")[:, :BRANCHES]
+    return np.take_along_axis(q, first[..., None], axis=1), np.take_along_axis(error, first, axis=1)
 
-    Args:
-        chain: of the limb.
-        target: exact poses of the tip (B, 4, 4).
 
-    Returns:
-        q (B, 16, 6), not wrapped; error (B, 16) [m and rad, norm], infinite where there is no branch.
+def _both_sides(chain: SerialChain, q: Array, target: Array) -> tuple[Array, Array]:
+    """Positions (R, 6) to both sides of a fold, where two branches fall together.
+
+    There one motion v of the joints leaves the tip, to first order, and one part u of the residual, which
+    only the second order of that motion can make vanish.
     """
-    q, error = np.zeros((len(target), BRANCHES, 6)), np.full((len(target), BRANCHES), np.inf)
-    for start in range(0, len(target), BLOCK):
-        some = target[start : start + BLOCK]
-        owner, angles, far = _candidates(chain, some)
-        place = np.arange(len(owner)) - np.searchsorted(owner, owner)
-        few = place < BRANCHES
-        q[start + owner[few], place[few]] = angles[few]
-        error[start + owner[few], place[few]] = far[few]
-    # near a singular position Newton's method takes more steps, as the elimination leaves less digits there
-    owner, k = ((error > ROUGH) & (error < NEAR)).nonzero()
-    for _ in range(ROUNDS):
-        out = run(polished(chain), {"start": q[owner, k], "target": target[owner]})
-        better = out["error"][:, 0] < error[owner, k]
-        owner, k = owner[better], k[better]
-        q[owner, k], error[owner, k] = out["q"][better], out["error"][better, 0]
-        more = error[owner, k] > ROUGH
-        owner, k = owner[more], k[more]
-    return q, error
-
-
-def _candidates(chain: SerialChain, target: Array) -> tuple[Integers, Array, Array]:
-    """Sample (R,), angles (R, 6) and error (R,) of every zero of the determinant."""
-    table = run(equations(chain), {"target": target})["table"]
-    x = equal_angles(ANGLES)
-    matrices = np.stack([np.ones(ANGLES), np.cos(x), np.sin(x)], axis=1) @ table
-    owner, zero = _zeros(run(values(), {"matrix": matrices})["value"][..., 0])
-    circle = np.stack([np.cos(zero), np.sin(zero)], axis=1)
-    out = run(branch(chain), {"target": target[owner], "circle": circle, "table": table[owner]})
-    return owner, out["q"], out["error"][:, 0]
-
-
-def _zeros(value: Array) -> tuple[Integers, Array]:
-    """Index (R,), ascending, and angle (R,) of the zeros of polynomials from their values (B, 17)."""
-    terms = harmonics(value)
-    owner, low, high, dips, negative = cells(terms)
-    at = owner[dips]
-    ends = {"low": low[dips, None], "high": high[dips, None]}
-    out = run(zero(1), {"terms": terms[at], **ends})
-    bottom, depth = out["angle"], out["value"][:, 0]
-    crossed = (depth < 0) != negative[dips]
-    touched = ~crossed & (np.abs(depth) <= TOUCH)
-    lows = [low[~dips], low[dips][crossed], bottom[crossed, 0]]
-    highs = [high[~dips], bottom[crossed, 0], high[dips][crossed]]
-    owners = np.concatenate([owner[~dips], at[crossed], at[crossed]])
-    ends = {"low": np.concatenate(lows)[:, None], "high": np.concatenate(highs)[:, None]}
-    found = run(zero(0), {"terms": terms[owners], **ends})["angle"][:, 0]
-    owners, found = np.concatenate([owners, at[touched]]), np.concatenate([found, bottom[touched, 0]])
-    order = np.lexsort((found, owners))
-    return owners[order], found[order]
-
-
-@cache
-def zero(order: int) -> Program:
-    """Where a polynomial or its slope (``order`` 1) changes its sign between two angles; its value there."""
-    recorder = Recorder(
-        f"crossing_{order}", "Where a trigonometric polynomial or its slope changes its sign."
+    weights = np.r_[np.ones(3), np.full(3, 1 / chain.length)]
+    U, _, Vt = np.linalg.svd(residual(chain, q, target)[1] * weights[:, None])
+    u, v = U[:, :, -1] * weights, Vt[:, -1]
+    here, ahead, back = (
+        (u * residual(chain, x, target)[0]).sum(axis=1) for x in (q, q + SIDE * v, q - SIDE * v)
     )
-    terms = recorder.input("terms", ANGLES + 1)
-    (low,), (high,) = recorder.input("low", 1), recorder.input("high", 1)
-    x = crossing(terms, low, high, order)
-    recorder.output("angle", [x])
-    recorder.output("value", derivatives(terms, x, (0,)))
-    return recorder.program()
+    bend = (ahead + back - 2 * here) / SIDE**2
+    square = -2 * here / np.where(bend == 0, np.inf, bend)
+    step = np.sqrt(np.clip(square, SIDE**2, FOLD))[:, None] * v
+    return q + step, q - step
 
 
 @cached
-def equations(chain: SerialChain) -> Program:
-    """The table of ``Elimination`` for a pose of the tip."""
-    way = elimination(chain)
-    assert way is not None
+def relative_branches(chain: SerialChain) -> Program:
+    """All branches of the limb's relative."""
+    form = relative(chain)
+    assert form is not None
     recorder = Recorder(
-        identifier(chain.limb, "equations"),
-        f"Six equations in two joints of {chain.limb}: coefficients of 1, cosine and sine of a third joint.",
+        identifier(chain.limb, "relative"),
+        f"All branches of the limb nearest to {chain.limb} that has a closed form; slack: how far they are"
+        " from falling together.",
     )
-    table = way.table(way.displacement(pose_input(recorder, "target")))
-    recorder.output("table", [x for part in table for x in part], 3, 54)
+    rows = form.formula(pose_input(recorder, "target"))
+    recorder.output("q", [x for *angles, _ in rows for x in angles], len(rows), 6)
+    recorder.output("slack", [slack for *_, slack in rows])
     return recorder.program()
 
 
-@cache
-def values() -> Program:
-    """The determinant that vanishes at a solution."""
-    recorder = Recorder("dialytic_determinant", "What vanishes where six equations have a common solution.")
-    recorder.output("value", [vanishing(recorder.input("matrix", 54))])
-    return recorder.program()
-
-
-@cached
-def branch(chain: SerialChain) -> Program:
-    """The positions of a limb for one zero of the determinant."""
-    way = elimination(chain)
-    assert way is not None
-    recorder = Recorder(
-        identifier(chain.limb, "branch"),
-        f"Joint positions of {chain.limb} for an angle of one joint at which six equations have a common"
-        " solution, after Newton steps; error: norm of the residual [m and rad].",
-    )
-    target, (c, s) = pose_input(recorder, "target"), recorder.input("circle", 2)
-    q = way.branch(way.displacement(target), c, s, recorder.input("table", 3, 54))
-    q, error = _polished(chain, q, target)
-    recorder.output("q", q)
-    recorder.output("error", [error])
-    return recorder.program()
-
-
-@cached
-def polished(chain: SerialChain) -> Program:
-    """Some Newton steps of a limb."""
-    recorder = Recorder(
-        identifier(chain.limb, "newton"), f"Newton steps of {chain.limb} towards a pose of its tip."
-    )
-    q, error = _polished(chain, recorder.input("start", len(chain.screws)), pose_input(recorder, "target"))
-    recorder.output("q", q)
-    recorder.output("error", [error])
-    return recorder.program()
-
-
-def _polished(chain: SerialChain, q: Sequence[Scalar], target: Pose) -> tuple[list[Scalar], Scalar]:
-    """The best of some positions and what Newton steps make of them, and its error."""
-    best, error = list(q), miss(chain, q, target)
-    for _ in range(NEWTON):
-        q = _newton_step(chain, q, target)
-        new = miss(chain, q, target)
-        better = new < error
-        best = [where(better, x, y) for x, y in zip(q, best, strict=True)]
-        error = where(better, new, error)
-    return best, error
-
-
-def _newton_step(chain: SerialChain, q: Sequence[Scalar], target: Pose) -> list[Scalar]:
-    tip, columns = forward(chain.screws, q, chain.tip)
-    pairs = zip((tip.R.x, tip.R.y, tip.R.z), (target.R.x, target.R.y, target.R.z), strict=True)
-    x, y, z = (cross(here, there) for here, there in pairs)
-    wanted = Twist((x + y + z) * 0.5, target.p - tip.p)
-    rates, _ = pose_rates([at(tip.p, column) for column in columns], None, wanted, chain.length)
-    return [x + larger(-LONGEST, least(rate, LONGEST)) for x, rate in zip(q, rates, strict=True)]
-
-
-def elimination_programs(chain: SerialChain) -> list[Program]:
-    """What ``branches`` runs for a limb."""
-    return [equations(chain), values(), zero(0), zero(1), branch(chain), polished(chain)]
+def branch_programs(chain: SerialChain) -> list[Program]:
+    """What ``branch_solutions`` runs for a limb."""
+    own = [relative_branches(chain)] if _by_relative(chain) else elimination_programs(chain)
+    return [*own, steps(chain)]

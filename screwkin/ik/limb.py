@@ -41,10 +41,10 @@ def limb_ik(
         T_base_tip: wanted poses of the tip in the base frame (..., 4, 4) [m]; or positions (..., 3) with the
             orientation free.
         method: ``"closed"``, exact and with all branches, for limbs whose screw table allows it;
-            ``"elimination"``, with all branches of any six revolute joints; numeric from the guess:
+            ``"branches"``, all of them for six revolute joints of any geometry; numeric from the guess:
             ``"newton"``, ``"lm"`` (Levenberg-Marquardt), ``"dls"`` (damped least squares), ``"pinv"``
             (pseudoinverse); ``"hybrid"``: numeric from the solution of a similar limb with a spherical hip;
-            ``"auto"``: closed where possible, else elimination, else newton.
+            ``"auto"``: closed where possible, else branches, else newton.
         guess: positions (..., n) of the limb's joints [rad or m]; default: those of posture ``home``, without
             one the middle of the limits. Numeric methods start there, and branches near it come first.
         settings: tolerances, starts, damping and the like of the numeric methods. Within the tolerances a

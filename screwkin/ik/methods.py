@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.errors import InputError
-from screwkin.ik.all_branches import eliminated_solutions, elimination
+from screwkin.ik.all_branches import branch_solutions, has_branches
 from screwkin.ik.branches import closed_solutions
 from screwkin.ik.closed import closed_form, recognised
 from screwkin.ik.hybrid import hybrid_seed
@@ -18,8 +19,10 @@ from screwkin.ik.system import System
 from screwkin.kinematics.arrays import checked, exact_target, of_shape, one_batch
 from screwkin.kinematics.serial_chain import SerialChain
 
-Chosen = Literal["closed", "elimination", "hybrid"] | Numeric
-Method = Literal["auto", "closed", "elimination", "hybrid", "newton", "lm", "dls", "pinv"]
+STARTS = 8
+"""Starts for the nearest pose where no branch is a solution: hardly any is missed."""
+Chosen = Literal["closed", "branches", "hybrid"] | Numeric
+Method = Literal["auto", "closed", "branches", "hybrid", "newton", "lm", "dls", "pinv"]
 
 
 def solve_limb_arrays(
@@ -45,19 +48,19 @@ def solve_limb_arrays(
 
 
 def _chosen(chain: SerialChain, method: Method, position: bool) -> Chosen:
-    """The method; of ``"auto"`` the closed form where there is one, else elimination, else newton.
+    """The method; of ``"auto"`` the closed form where there is one, else all branches, else newton.
 
     Raises:
-        InputError: the limb has no closed form, but the method is ``"closed"``; or no elimination.
+        InputError: the limb has no closed form, but the method is ``"closed"``; or no branches.
     """
     if method == "auto":
         if recognised(chain, position):
             return "closed"
-        return "newton" if position or elimination(chain) is None else "elimination"
-    if method == "elimination" and (position or elimination(chain) is None):
+        return "branches" if not position and has_branches(chain) else "newton"
+    if method == "branches" and (position or not has_branches(chain)):
         raise InputError(
-            f"{chain.limb} has no elimination: poses (..., 4, 4) and six revolute joints in general places"
-            " are needed. Use a numeric method"
+            f"{chain.limb} has no branches that can be computed: poses (..., 4, 4) and six revolute"
+            " joints in general places are needed. Use a numeric method"
         )
     if method == "closed" and not recognised(chain, position):
         if position:
@@ -95,8 +98,8 @@ def solve_limb(
     chosen = _chosen(chain, method, position)
     if chosen == "closed":
         return closed_solutions(chain, target, guess, settings.tolerances, nearest)
-    if chosen == "elimination":
-        return _by_elimination(chain, target, guess, settings, batch, nearest)
+    if chosen == "branches":
+        return _by_branches(chain, target, guess, settings, batch, nearest)
     if chosen == "hybrid" and position:
         raise InputError("method hybrid needs poses (..., 4, 4); positions (..., 3) need another method")
     start = hybrid_seed(chain, target, guess) if chosen == "hybrid" else guess
@@ -109,7 +112,7 @@ def solve_limb(
     return ordered(chain, chosen, q[one], valid[one], error[one], iterations[one], guess, batch)
 
 
-def _by_elimination(
+def _by_branches(
     chain: SerialChain,
     target: Array,
     guess: Array,
@@ -118,10 +121,11 @@ def _by_elimination(
     nearest: bool,
 ) -> LimbSolutions:
     """All branches; where there is none, if wanted, what Newton's method comes nearest to the target with."""
-    solutions = eliminated_solutions(chain, target, guess, settings.tolerances, batch)
+    solutions = branch_solutions(chain, target, guess, settings.tolerances, batch)
     lost = np.flatnonzero(~solutions.valid.reshape(len(target), -1).any(axis=1))
     if nearest and len(lost):
-        part = solve_limb(chain, target[lost], "newton", guess[lost], settings, (len(lost),))
+        few = replace(settings, starts=min(settings.starts, STARTS))
+        part = solve_limb(chain, target[lost], "newton", guess[lost], few, (len(lost),))
         for name in ("q", "valid", "in_limits", "residual", "iterations"):
             whole = getattr(solutions, name)
             whole.reshape(len(target), *whole.shape[len(batch) :])[lost, 0] = getattr(part, name)[:, 0]

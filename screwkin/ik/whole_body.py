@@ -12,7 +12,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.pattern import components
 from screwkin.compiler.program import kept
-from screwkin.ik.all_branches import elimination
+from screwkin.ik.all_branches import has_branches
 from screwkin.ik.branches import certified_pose, closed_pose
 from screwkin.ik.closed import recognised
 from screwkin.ik.methods import solve_limb
@@ -84,8 +84,8 @@ def solve_whole_body(
         if len(rows) == 1 and method == "auto":
             if recognised(chain, target.ndim == 2):
                 solve = _by_closed_form
-            elif target.ndim == 3 and elimination(chain):
-                solve = _by_elimination
+            elif target.ndim == 3 and has_branches(chain):
+                solve = _by_branches
         solve(_Work(base, q, parts, settings), [limbs[row] for row in rows], rows)
     counts = [parts[name].reshape(*batch, len(limbs)) for name in COUNTED]
     state = State(base.reshape(*batch, 4, 4), q[:, :size].reshape(*batch, size))
@@ -146,13 +146,13 @@ def _by_closed_form(work: _Work, limbs: Sequence[Limb], rows: Sequence[int]) -> 
         parts["worst_joint"][beyond, row] = np.array(joints)[worst]
 
 
-def _by_elimination(work: _Work, limbs: Sequence[Limb], rows: Sequence[int]) -> None:
+def _by_branches(work: _Work, limbs: Sequence[Limb], rows: Sequence[int]) -> None:
     """One limb of six joints without closed form."""
     ((tip, chain, target),) = limbs
     base = exact_target("base", checked("base", work.base))
     target = in_base(base, exact_target(tip, checked(tip, target)))
     guess = work.q[:, list(chain.joints)]
-    solutions = solve_limb(chain, target, "elimination", guess, work.settings, (len(target),))
+    solutions = solve_limb(chain, target, "branches", guess, work.settings, (len(target),))
     x, system = chain.nearest_turn(solutions.best, guess), System([chain], [target])
     _fill(work, system, x, solutions.iterations[:, 0], rows)
 

@@ -1,4 +1,4 @@
-"""Six joints without closed form: all branches, by elimination, certified by their residual."""
+"""Six joints without closed form: all branches, each certified by its residual."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 import screwkin as sk
 from screwkin.algebra.linear import determinant, null_vector
 from screwkin.errors import InputError
-from screwkin.ik.all_branches import elimination
+from screwkin.ik.all_branches import has_branches
 from screwkin.ik.closed import recognised
 from screwkin.ik.methods import solve_limb_arrays
 from screwkin.ik.numeric import IkSettings
@@ -55,6 +55,9 @@ LEGS = {
     "random": random_leg(0),
     "parallel to 2e-3": nearly(offset_leg(), 2e-3, 1),
     "meeting to 2e-3": nearly(spherical_leg(), 2e-3, 2),
+    "parallel to 1e-6": nearly(offset_leg(), 1e-6, 3),
+    "meeting to 1e-6": nearly(spherical_leg(), 1e-6, 4),
+    "meeting to 5e-5": nearly(spherical_leg(), 5e-5, 5),
 }
 
 
@@ -73,7 +76,7 @@ def assert_own_branch(leg: Leg, count: int, share: float, seed: int = 0) -> None
     q = np.random.default_rng(seed).uniform(LOW, HIGH, (count, 6))
     T = leg.reach(q)
     found = solved(chain, T)
-    assert found.method == "elimination"
+    assert found.method == "branches"
     own = (apart(found.q, q[:, None]) < 1e-6) & found.valid
     assert own.any(axis=1).mean() >= share
     assert found.in_limits.any(axis=1).mean() >= share
@@ -138,12 +141,12 @@ def test_whole_bodies_and_limbs_agree_about_limbs_without_closed_form() -> None:
         np.testing.assert_allclose(solution.state.q[:, list(chain.joints)], best, atol=1e-9)
 
 
-def test_elimination_is_refused_where_it_does_not_fit() -> None:
+def test_branches_are_refused_where_it_does_not_fit() -> None:
     robot = random_robot(1)
     T = np.eye(4)
     with pytest.raises(InputError, match="six revolute joints"):
-        sk.limb_ik(robot, "left_arm", T, "elimination")
-    assert elimination(SerialChain.of(robot, "left_arm")) is None
+        sk.limb_ik(robot, "left_arm", T, "branches")
+    assert not has_branches(SerialChain.of(robot, "left_arm"))
 
 
 def test_reflections_give_determinants_and_null_vectors() -> None:
