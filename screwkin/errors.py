@@ -95,7 +95,7 @@ class MissingDependencyError(ScrewkinError, ImportError):
     exit_code = 2
 
 
-_PACKAGES = {"serial": "pyserial", "dynamixel_sdk": "dynamixel-sdk", "PIL": "pillow"}
+_PACKAGES = {"serial": "pyserial", "dynamixel_sdk": "dynamixel-sdk", "PIL": "pillow", "collada": "pycollada"}
 
 
 def missing_library(error: ImportError, purpose: str) -> MissingDependencyError:

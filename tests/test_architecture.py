@@ -37,6 +37,8 @@ DRIVERS = {
     "pybullet": "screwkin.sim.pybullet",
     "pybullet_data": "screwkin.sim.pybullet",
     "mujoco": "screwkin.sim.mujoco",
+    "trimesh": "screwkin.model.meshes",
+    "collada": "screwkin.model.meshes",
     "serial": "screwkin.servo.bus",
     "dynamixel_sdk": "screwkin.servo.bus",
 }

@@ -4,15 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, get_args
 
 from screwkin.algebra.scalar import Scalar, times
 from screwkin.algebra.screws import INFINITE, Screw
-from screwkin.algebra.se3 import UNTURNED, ZERO, Pose, Vector, X, Y, Z, rotate
+from screwkin.algebra.se3 import IDENTITY, UNTURNED, ZERO, Pose, Vector, X, Y, Z, rotate
 from screwkin.model.mirror import closes_within, image, interleaved
-from screwkin.model.records import Box, Closure, Inertia, Joint, Limb, Link, Posture, RobotRecord, Sole
+from screwkin.model.records import (
+    Box,
+    Closure,
+    Inertia,
+    Joint,
+    Limb,
+    Link,
+    Posture,
+    RobotRecord,
+    Shape,
+    ShapeKind,
+    Sole,
+)
 from screwkin.model.rows import Rows
-from screwkin.model.schema import FrameRow, InertiaRow, JointRow, LimbRow, LinkRow, MirrorRow
+from screwkin.model.schema import FrameRow, InertiaRow, JointRow, LimbRow, LinkRow, MirrorRow, ShapeRow
 from screwkin.model.structure import Mirrored
 
 
@@ -101,7 +113,17 @@ def _link(row: LinkRow, origin: Vector) -> Link:
     frame = Pose(UNTURNED, origin) if row.frame is None else _pose(row.frame)
     com = frame.p if row.com is None else row.com
     boxes = tuple(Box(box.center, box.size) for box in row.boxes)
-    return Link(row.name, row.mass, com, _inertia(row.inertia, row.mass), frame, boxes)
+    shapes = tuple(_shape(shape) for shape in row.shapes)
+    return Link(row.name, row.mass, com, _inertia(row.inertia, row.mass), frame, boxes, shapes)
+
+
+def _shape(row: ShapeRow) -> Shape:
+    """A shape of the kind that the row has a value for; a sphere's is its radius alone."""
+    pose = IDENTITY if row.frame is None else _pose(row.frame)
+    kind: ShapeKind = next(kind for kind in get_args(ShapeKind) if getattr(row, kind) is not None)
+    value = row.scale if kind == "mesh" else getattr(row, kind)
+    size = (value,) if kind == "sphere" else tuple(value)
+    return Shape(row.role, kind, pose, size, row.mesh or "", row.colour)
 
 
 def _inertia(row: InertiaRow | None, mass: Scalar) -> Inertia:

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from screwkin.errors import Fault
 from screwkin.model.inertias import negative_moments
-from screwkin.model.records import Inertia, Sole
+from screwkin.model.records import Inertia, ShapeKind, Sole
 from screwkin.model.rows import Rows
-from screwkin.model.schema import InertiaRow, JointRow, LinkRow, SoleRow
+from screwkin.model.schema import InertiaRow, JointRow, LinkRow, ShapeRow, SoleRow
 
 _COMPONENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 _FLAT = 1e-6  # m: far below what a floor is flat to
@@ -37,6 +37,19 @@ def _link(link: LinkRow) -> Iterator[tuple[str, str, str]]:
             "is missing",
             "Write { box = [lx, ly, lz] } or { xx, yy, zz, xy, xz, yz }, or mass = 0",
         )
+    for i, shape in enumerate(link.shapes):
+        yield from _shape(f"shapes[{i}]", shape)
+
+
+def _shape(key: str, shape: ShapeRow) -> Iterator[tuple[str, str, str]]:
+    given = [kind for kind in get_args(ShapeKind) if getattr(shape, kind) is not None]
+    if len(given) != 1:
+        found = f"is {' and '.join(given)} at once" if given else "is nothing"
+        yield key, found, f"Write one of {', '.join(get_args(ShapeKind))}"
+    elif "scale" in shape.model_fields_set and shape.mesh is None:
+        yield f"{key}.scale", f"stands on a {given[0]}", "Leave it out: only a mesh has one"
+    elif shape.mesh == "":
+        yield f"{key}.mesh", "is empty", "Write the path of a file"
 
 
 def _inertia(inertia: InertiaRow) -> Iterator[tuple[str, str, str]]:

@@ -21,6 +21,7 @@ _SIDE = re.compile(r"(?<![A-Za-z])(right|left|Right|Left|RIGHT|LEFT)(?![a-z])")
 _OTHER = {"right": "left", "Right": "Left", "RIGHT": "LEFT"}
 _OTHER |= {left: right for right, left in _OTHER.items()}
 _NAMES = ("name", "link", "tip", "limb")
+_EDGES = ("size", "box")
 _LINKS = ("parent", "child", "link_a", "link_b")
 
 
@@ -93,7 +94,7 @@ def _reflected(key: str, value: Any, part: Collection[str]) -> Any:
     if isinstance(value, Vector):
         if key == "rpy":
             return Vector(-value.x, value.y, -value.z)
-        return Vector(value.x, value.y if key == "size" else -value.y, value.z)
+        return Vector(value.x, value.y if key in _EDGES else -value.y, value.z)
     if key in _NAMES or (key in _LINKS and value in part):
         return swapped(value)
     return value

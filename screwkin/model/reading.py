@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from screwkin.algebra.scalar import Scalar
@@ -11,8 +12,9 @@ from screwkin.errors import Fault, TableError, near
 from screwkin.model.build import joints_of, robot_from_rows, with_images
 from screwkin.model.checks import row_faults
 from screwkin.model.expression import listed, resolve_parameters
+from screwkin.model.mesh_files import full_path
 from screwkin.model.mirror import turns_around
-from screwkin.model.records import LIMIT_TOLERANCE, Joint, RobotRecord
+from screwkin.model.records import LIMIT_TOLERANCE, Joint, Link, RobotRecord
 from screwkin.model.rows import Rows, parameters_of, read_rows
 from screwkin.model.structure import Mirrored, joint_names, mirrored_limbs, structure_faults
 from screwkin.model.toml import read_toml
@@ -77,7 +79,15 @@ def read_table(text: str, path: str, symbolic: bool = False) -> RobotRecord:
         names, _ = resolve_parameters(parameters_of(data), symbolic=True)
         rows = with_images(read_rows(data, names, table.numbers)[0], table.mirrored, table.around)
     record = robot_from_rows(rows)
-    return replace(record, parameters=dict(names), text=text, path=path)
+    links = tuple(_with_meshes_of(Path(path).parent, link) for link in record.links)
+    return replace(record, links=links, parameters=dict(names), text=text, path=path)
+
+
+def _with_meshes_of(folder: Path, link: Link) -> Link:
+    """A link whose meshes are named from a folder, with their paths."""
+    if not any(shape.file for shape in link.shapes):
+        return link
+    return replace(link, shapes=tuple(replace(s, file=full_path(s.file, folder)) for s in link.shapes))
 
 
 def _posture_faults(rows: Rows, joints: Sequence[Joint], known: Sequence[str]) -> Iterator[Fault]:

@@ -109,6 +109,8 @@ def _discord(robot: RobotRecord, row: Any) -> Iterator[tuple[str, str, str]]:
     for f in fields(row):
         if isinstance(getattr(row, f.name), Pose):
             yield from _skewed(getattr(row, f.name), f.name)
+    for i, shape in enumerate(row.shapes if isinstance(row, Link) else ()):
+        yield from _skewed(shape.pose, f"shapes[{i}].pose")
 
 
 def _skewed(pose: Pose, key: str) -> Iterator[tuple[str, str, str]]:

@@ -17,6 +17,8 @@ from screwkin.algebra.screws import Screw
 from screwkin.algebra.se3 import Pose, Vector
 
 JointType = Literal["revolute", "prismatic", "helical"]
+ShapeKind = Literal["box", "cylinder", "sphere", "capsule", "mesh"]
+ShapeRole = Literal["visual", "collision"]
 LimbKind = Literal["leg", "arm"]
 LIMIT_TOLERANCE = 1e-9
 """Excess over a joint limit [rad or m] that counts as rounding: one number for the whole package."""
@@ -28,6 +30,28 @@ class Box:
 
     center: Vector
     size: Vector
+
+
+@dataclass(frozen=True)
+class Shape:
+    """What a link looks like or occupies, for pictures and geometry; contact is that of ``Link.boxes``.
+
+    Attributes:
+        role: ``visual``, for pictures, or ``collision``.
+        kind: a solid centred in its frame, or a mesh.
+        pose: its frame in the zero pose, in base axes.
+        size: of a box: edges; of a cylinder or capsule: radius, and length along z without caps; of a sphere:
+            radius [m]; of a mesh: factors along the axes of its file.
+        file: of a mesh: a path, or the URI of a file that was not found; else empty.
+        colour: red, green, blue in [0, 1]; empty if unknown.
+    """
+
+    role: ShapeRole
+    kind: ShapeKind
+    pose: Pose
+    size: tuple[Scalar, ...]
+    file: str = ""
+    colour: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -52,7 +76,7 @@ class Inertia:
 
 @dataclass(frozen=True)
 class Link:
-    """A rigid body: mass [kg], CoM, inertia, its own frame, and boxes for contact and pictures."""
+    """A rigid body: mass [kg], CoM, inertia, its own frame, boxes for contact, and shapes beside them."""
 
     name: str
     mass: Scalar
@@ -60,6 +84,7 @@ class Link:
     inertia: Inertia
     frame: Pose
     boxes: tuple[Box, ...] = ()
+    shapes: tuple[Shape, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -15,10 +15,14 @@ from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.se3 import Vector
 from screwkin.errors import Fault, near
 from screwkin.model.expression import listed
-from screwkin.model.records import JointType, LimbKind
+from screwkin.model.records import JointType, LimbKind, ShapeRole
 from screwkin.model.values import (
     COUPLINGS,
     Chain,
+    Colour,
+    Factors,
+    Length,
+    Lengths,
     Mass,
     Name,
     Number,
@@ -60,6 +64,20 @@ class BoxRow(Row):
     size: Size = Field(description="edges [lx, ly, lz] in m")
 
 
+class ShapeRow(Row):
+    """A solid or a mesh, for pictures and geometry: one of box, cylinder, sphere, capsule, mesh."""
+
+    role: ShapeRole = Field(description='"visual" or "collision"')
+    box: Size | None = Field(None, description="edges [lx, ly, lz] in m")
+    cylinder: Lengths | None = Field(None, description="[radius, length along z] in m")
+    sphere: Length | None = Field(None, description="radius in m")
+    capsule: Lengths | None = Field(None, description="[radius, length along z without caps] in m")
+    mesh: str | None = Field(None, description="path of a file, from this table's folder")
+    scale: Factors = Field(Vector(1, 1, 1), description="factors [x, y, z] of a mesh")
+    frame: FrameRow | None = Field(None, description="{ xyz = [x, y, z], rpy = [roll, pitch, yaw] }")
+    colour: Colour = Field((), description="[red, green, blue] in [0, 1]")
+
+
 class InertiaRow(Row):
     """Inertia about the CoM: the edges of a solid box that has it, or its six components [kg m^2]."""
 
@@ -83,6 +101,7 @@ class LinkRow(Row):
     )
     frame: FrameRow | None = Field(None, description="{ xyz = [x, y, z], rpy = [roll, pitch, yaw] }")
     boxes: list[BoxRow] = Field([], description="[{ center = [x, y, z], size = [lx, ly, lz] }]")
+    shapes: list[ShapeRow] = Field([], description='[{ role = "visual", mesh = "foot.stl", frame = {...} }]')
 
 
 class JointRow(Row):
@@ -164,6 +183,7 @@ _PARTS: Mapping[str, type[Row]] = {
     "frame_a": FrameRow,
     "frame_b": FrameRow,
     "boxes": BoxRow,
+    "shapes": ShapeRow,
 }
 
 Kind = TypeVar("Kind", bound=Row)

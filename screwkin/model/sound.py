@@ -7,15 +7,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from screwkin.algebra.se3 import Pose, Vector
 from screwkin.model.checks import sole_faults
-from screwkin.model.records import Inertia, Joint, RobotRecord
+from screwkin.model.records import Inertia, Joint, RobotRecord, Shape, ShapeRole
 from screwkin.model.structure import RESERVED
 from screwkin.model.values import COUPLINGS, NAME, UNIT_TOLERANCE
+
+_SIZES = {"box": 3, "cylinder": 2, "sphere": 1, "capsule": 2, "mesh": 3}
+_ROLES = get_args(ShapeRole)
 
 
 def certified(robot: RobotRecord) -> bool:
@@ -28,7 +31,8 @@ def certified(robot: RobotRecord) -> bool:
 
 def _names_certified(robot: RobotRecord) -> bool:
     links, joints, limbs = robot.links, robot.joints, robot.limbs
-    inner: list[Any] = [link.boxes for link in links] + [sole.corners for sole in robot.soles]
+    inner: list[Any] = [rows for link in links for rows in (link.boxes, link.shapes)]
+    inner += [sole.corners for sole in robot.soles]
     inner += [posture.q for posture in robot.postures]
     if not all(
         isinstance(rows, tuple)
@@ -74,6 +78,8 @@ def _numbers_certified(robot: RobotRecord) -> bool:
     frames += [] if robot.waist is None else [robot.waist]
     frames += [frame for closure in closures for frame in (closure.frame_a, closure.frame_b)]
     boxes = [box for link in robot.links for box in link.boxes]
+    shapes = [shape for link in robot.links for shape in link.shapes]
+    frames += [shape.pose for shape in shapes]
     points = [link.com for link in robot.links] + [joint.screw.s0 for joint in joints]
     points += [frame.p for frame in frames] + [box.center for box in boxes]
     points += [corner for sole in robot.soles for corner in sole.corners]
@@ -84,6 +90,7 @@ def _numbers_certified(robot: RobotRecord) -> bool:
         and bool(np.isfinite(_array(points)).all())
         and bool((_array([box.size for box in boxes]) > 0).all())
         and bool(np.isfinite(_array([box.size for box in boxes])).all())
+        and all(map(_is_shape, shapes))
         and bool((np.abs(lengths - 1) < UNIT_TOLERANCE / 2).all())
         and _are_rotations(frames)
         and _are_inertias([link.inertia for link in robot.links])
@@ -123,6 +130,19 @@ def _are_inertias(inertias: Sequence[Inertia]) -> bool:
     if not np.isfinite(matrices).all():
         return False
     return bool((np.linalg.eigvalsh(matrices) >= 0).all())
+
+
+def _is_shape(shape: Shape) -> bool:
+    size, is_mesh = _floats(shape.size), shape.kind == "mesh"
+    sound = np.isfinite(size) & (size != 0 if is_mesh else size > 0)
+    return (
+        shape.role in _ROLES
+        and sound.shape == (_SIZES[shape.kind],)
+        and bool(sound.all())
+        and (bool(shape.file) and isinstance(shape.file, str) if is_mesh else shape.file == "")
+        and len(shape.colour) in (0, 3)
+        and all(0 <= c <= 1 for c in shape.colour)
+    )
 
 
 def _is_joint(joint: Joint) -> bool:

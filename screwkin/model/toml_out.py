@@ -12,9 +12,9 @@ from dataclasses import fields, is_dataclass
 from typing import Any
 
 from screwkin.algebra.scalar import Scalar
-from screwkin.algebra.se3 import UNTURNED, ZERO, Pose, Rotation, Vector, leaves
+from screwkin.algebra.se3 import IDENTITY, UNTURNED, ZERO, Pose, Rotation, Vector, leaves
 from screwkin.errors import InputError
-from screwkin.model.records import Joint, Limb, Link, Posture, RobotRecord, open_scalars
+from screwkin.model.records import Joint, Limb, Link, Posture, RobotRecord, Shape, open_scalars
 from screwkin.model.values import COUPLINGS
 
 _UNLIMITED = {"lower": -math.inf, "upper": math.inf, "velocity": math.inf, "effort": math.inf}
@@ -104,6 +104,23 @@ def _link(link: Link, origin: Vector) -> dict[str, Any]:
         row["frame"] = _frame(link.frame)
     if link.boxes:
         row["boxes"] = _plain(link.boxes)
+    if link.shapes:
+        row["shapes"] = [_shape(shape) for shape in link.shapes]
+    return row
+
+
+def _shape(shape: Shape) -> dict[str, Any]:
+    row: dict[str, Any] = {"role": shape.role}
+    if shape.kind == "mesh":
+        row["mesh"] = shape.file
+        if any(factor != 1 for factor in shape.size):
+            row["scale"] = list(shape.size)
+    else:
+        row[shape.kind] = shape.size[0] if len(shape.size) == 1 else list(shape.size)
+    if leaves(shape.pose) != leaves(IDENTITY):
+        row["frame"] = _frame(shape.pose)
+    if shape.colour:
+        row["colour"] = list(shape.colour)
     return row
 
 

@@ -27,10 +27,11 @@ from screwkin.model.inertias import (
     negative_moments,
     without_noise,
 )
-from screwkin.model.records import Box, Inertia, Joint, Link, RobotRecord
+from screwkin.model.records import Box, Inertia, Joint, Link, RobotRecord, Shape
 from screwkin.model.robot import Robot
 from screwkin.model.toml import read_text
 from screwkin.model.toml_out import robot_toml
+from screwkin.model.urdf_shapes import shape_reader
 from screwkin.model.urdf_xml import (
     TYPES,
     Edge,
@@ -45,7 +46,6 @@ from screwkin.model.urdf_xml import (
 )
 
 _UNLIMITED = 1e9  # written by programs that have no word for infinity, this one among them
-_WHOLE = 1e-9  # how far a turned box may be from the base axes
 _KEPT = {
     "robot": {"link", "joint", "material"},
     "joint": {"origin", "parent", "child", "axis", "limit", "mimic"},
@@ -53,7 +53,6 @@ _KEPT = {
 _NO_NAME = re.compile(r"[^A-Za-z0-9_-]+")
 _IMPOSSIBLE = "inertia read as it stands though no body has it (to repair: convert --repair)"
 _REPAIRED = "inertia that no body has, replaced by the nearest that one can have"
-_BOXES_ONLY = "left out, as only boxes along the axes stay for contact"
 
 
 @dataclass(frozen=True)
@@ -100,11 +99,13 @@ def parse_urdf(text: str, path: str = "<text>", repair: bool = False, mimic: Mim
     if reader.faults:
         raise TableError(path, reader.faults)
     _note_left_out(reader, root, joints)
-    names = _unique_names(reader, links)
+    names, shapes = _unique_names(reader, links), shape_reader(reader, root, Path(path).parent)
     bodies = _bodies(base, joints, names)
     for name, element in links.items():
         _add_mass(reader, bodies[name], name, element, repair)
-        _add_boxes(reader, bodies[name], name, element)
+        boxes, others = shapes.shapes(name, element, bodies[name].poses[name])
+        bodies[name].boxes += boxes
+        bodies[name].shapes += others
     moving = [edge for edge in joints if edge.type != "fixed"]
     rows = [_joint(reader, edge, bodies[edge.parent], bodies[edge.child]) for edge in moving]
     whole = list({id(bodies[name]): bodies[name] for name in links}.values())
@@ -152,7 +153,7 @@ def _note_left_out(reader: Reader, root: Element, joints: Iterable[Edge]) -> Non
 
 @dataclass
 class _Body:
-    """Links that fixed joints hold together: their poses, masses with CoM and inertia in base axes, boxes.
+    """Links that fixed joints hold together: their poses, masses with CoM and inertia in base axes, shapes.
 
     ``negative`` lists those with negative moments of inertia.
     """
@@ -163,6 +164,7 @@ class _Body:
     masses: list[tuple[float, Array, Array]] = field(default_factory=list)
     negative: list[str] = field(default_factory=list)
     boxes: list[Box] = field(default_factory=list)
+    shapes: list[Shape] = field(default_factory=list)
 
 
 def _bodies(base: str, joints: Sequence[Edge], names: Mapping[str, str]) -> dict[str, _Body]:
@@ -231,26 +233,6 @@ def _audited(reader: Reader, name: str, inertia: Inertia, mass: float, repair: b
     return clean
 
 
-def _add_boxes(reader: Reader, body: _Body, name: str, link: Element) -> None:
-    """Boxes of contact, or of pictures where there are none for contact."""
-    row = f"<link> {name!r}"
-    for shape in link.findall("collision") or link.findall("visual"):
-        geometry = shape.find("geometry")
-        for solid in () if geometry is None else geometry:
-            here = body.poses[name] @ reader.origin(row, shape)
-            turned = np.abs(as_array(here.R))
-            whole = np.round(turned)
-            if solid.tag != "box" or np.abs(turned - whole).max() > _WHOLE:
-                kind = "turned box" if solid.tag == "box" else solid.tag
-                reader.note(_BOXES_ONLY, f"{kind} of {name}")
-                continue
-            size = whole @ np.array(reader.numbers(row, solid, "size", (0.0, 0.0, 0.0)))
-            if (size <= 0).any():
-                reader.fault(row, "size", "is missing or not positive", "Write three edges in m")
-                continue
-            body.boxes.append(Box(here.p, vector_from_array(size)))
-
-
 def _link(body: _Body) -> Link:
     """One body of all its masses: Steiner's theorem about the common CoM."""
     mass = sum(m for m, _, _ in body.masses)
@@ -262,7 +244,9 @@ def _link(body: _Body) -> Link:
         d = c - com
         total += inertia + m * (d @ d * np.eye(3) - np.outer(d, d))
     place = vector_from_array(com) if mass else body.frame.p
-    return Link(body.name, mass, place, inertia_from_matrix(total), body.frame, tuple(body.boxes))
+    return Link(
+        body.name, mass, place, inertia_from_matrix(total), body.frame, tuple(body.boxes), tuple(body.shapes)
+    )
 
 
 def _joint(reader: Reader, edge: Edge, parent: _Body, child: _Body) -> Joint:

@@ -82,6 +82,33 @@ def _positive_vector(value: object, info: ValidationInfo) -> Vector:
     return size
 
 
+def _factors(value: object, info: ValidationInfo) -> Vector:
+    factors = _vector(value, info)
+    if any(factor == 0 for factor in factors):
+        raise _wrong(f"factors {value!r}", "Write three factors other than 0, as [x, y, z]")
+    return factors
+
+
+def _length(value: object, info: ValidationInfo) -> Scalar:
+    length = _number(value, info)
+    if not is_symbolic(length) and length <= 0:
+        raise _wrong(f"{length:g} is not positive", "Write a positive length in m")
+    return length
+
+
+def _lengths(value: object, info: ValidationInfo) -> tuple[Scalar, ...]:
+    if not isinstance(value, list) or len(value) != 2:
+        raise _wrong(f"{value!r} is no pair", "Write [radius, length] in m")
+    return tuple(_length(item, info) for item in value)
+
+
+def _colour(value: object, info: ValidationInfo) -> tuple[float, ...]:
+    numbers = tuple(float(c) for c in _vector(value, info))
+    if not all(0 <= c <= 1 for c in numbers):
+        raise _wrong(f"{value!r} is no colour", "Write [red, green, blue] in [0, 1]")
+    return numbers
+
+
 def _mass(value: object, info: ValidationInfo) -> Scalar:
     mass = _number(value, info)
     if not is_symbolic(mass) and mass < 0:
@@ -119,5 +146,9 @@ Value = Annotated[float, PlainValidator(_value)]
 Positive = Annotated[float, PlainValidator(_positive)]
 Point = Annotated[Vector, PlainValidator(_vector)]
 Unit = Annotated[Vector, PlainValidator(_unit)]
+Factors = Annotated[Vector, PlainValidator(_factors)]
+Length = Annotated[Scalar, PlainValidator(_length)]
+Lengths = Annotated[tuple[Scalar, ...], PlainValidator(_lengths)]
+Colour = Annotated[tuple[float, ...], PlainValidator(_colour)]
 Size = Annotated[Vector, PlainValidator(_positive_vector)]
 Chain = Annotated[tuple[str, ...], PlainValidator(_chain)]

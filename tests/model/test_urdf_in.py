@@ -104,13 +104,17 @@ def test_what_cannot_be_kept_is_told():
     found = parse_urdf(text)
     (box,) = found.robot.link("upper").boxes
     np.testing.assert_allclose(as_array(box.size), [2, 1, 3], atol=1e-12)
+    assert [(shape.kind, shape.role) for shape in found.robot.link("upper").shapes] == [
+        ("mesh", "collision"),
+        ("box", "collision"),
+    ]
     assert np.isinf(found.robot.joints[0].velocity)
     told = "\n".join(found.remarks)
     for remark in (
         "left out: transmission",
         "renamed, as a table needs plain names: 'tool tip' to tool_tip",
         "merged, as fixed to one another: tool tip into upper",
-        "left out, as only boxes along the axes stay for contact: mesh of upper, turned box of upper",
+        "mesh files not found, so neither seen nor measured: a.stl",
         "velocity not above 0, taken as no limit: shoulder",
         "URDF names no limbs, soles and postures",
     ):

@@ -1,0 +1,103 @@
+"""Meshes from files, by trimesh: STL, OBJ, COLLADA and whatever else it reads."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from screwkin.algebra.arrays import Array
+from screwkin.errors import InputError, MissingDependencyError, needed_for
+from screwkin.files import read_file
+
+_UPRIGHT = {
+    "X": np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]]),
+    "Y": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
+    "Z": np.eye(3),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Triangles of a file, in its own axes and in its unit; COLLADA's in [m].
+
+    Attributes:
+        vertices: (V, 3).
+        faces: (F, 3) indices of vertices.
+        turn: (3, 3) from the file's axes to z up: unity but for COLLADA that says otherwise.
+    """
+
+    vertices: Array
+    faces: NDArray[np.int64]
+    turn: Array
+
+    @cached_property
+    def corners(self) -> Array:
+        """Vertices (N, 3) of the convex hull; all of them where they lie in a plane."""
+        from scipy.spatial import ConvexHull, QhullError
+
+        try:
+            return np.asarray(self.vertices[ConvexHull(self.vertices).vertices])
+        except (QhullError, ValueError):
+            return np.unique(self.vertices, axis=0)
+
+    @property
+    def is_upright(self) -> bool:
+        """Whether z is up in the file, or nothing is said of it."""
+        return bool((self.turn == np.eye(3)).all())
+
+
+def load_mesh(file: str | Path) -> Mesh:
+    """The mesh of a file; read anew only where the file has changed.
+
+    Raises:
+        InputError: it cannot be read, or holds no triangles.
+        MissingDependencyError: trimesh is absent, or what it needs for COLLADA.
+    """
+    try:
+        about = Path(file).stat()
+    except (OSError, ValueError) as wrong:
+        raise InputError(f"mesh {file}: cannot be read ({wrong})") from None
+    return _read(str(file), about.st_mtime_ns, about.st_size)
+
+
+@lru_cache(maxsize=512)
+def _read(file: str, changed: int, size: int) -> Mesh:
+    """The arguments beside the file say which state of it is meant."""
+    with needed_for("Reading meshes"):
+        import trimesh
+    kind = Path(file).suffix.lower().lstrip(".")
+    if kind == "dae":
+        with needed_for("Reading COLLADA"):
+            import collada  # noqa: F401
+    try:
+        data = read_file(file)
+        whole: Any = trimesh.load_scene(BytesIO(data), file_type=kind, process=False).to_mesh()
+        vertices, faces = np.array(whole.vertices, dtype=float), np.array(whole.faces, dtype=np.int64)
+    except MissingDependencyError:
+        raise
+    except Exception as wrong:  # damaged files raise whatever their reader stumbles over
+        raise InputError(f"mesh {file}: cannot be read ({type(wrong).__name__}: {wrong})") from None
+    if not len(faces) or not np.isfinite(vertices).all():
+        raise InputError(f"mesh {file}: holds no triangles of finite numbers")
+    turn = _UPRIGHT["Z"]
+    if kind == "dae":
+        unit, up = _asset(data)
+        vertices, turn = vertices * unit, _UPRIGHT[up]
+    for array in (vertices, faces):
+        array.flags.writeable = False
+    return Mesh(vertices, faces, turn)
+
+
+def _asset(data: bytes) -> tuple[float, str]:
+    """Unit [m] and upward axis of a COLLADA file, which trimesh leaves to its caller."""
+    head = data.partition(b"</asset>")[0]
+    up = re.search(rb"<up_axis>\s*([XYZ])_UP", head)
+    unit = re.search(rb"<unit\b[^>]*\bmeter\s*=\s*[\"']([0-9.eE+-]+)[\"']", head)
+    return float(unit[1]) if unit else 1.0, up[1].decode() if up else "Y"

@@ -1,0 +1,146 @@
+"""The extent of shapes and links: points whose convex hull is theirs, in the zero pose, in base axes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import as_array, leaves
+from screwkin.errors import InputError, MissingDependencyError
+from screwkin.model.meshes import load_mesh
+from screwkin.model.records import Box, Link, RobotRecord, Shape, ShapeRole
+
+_SIGNS = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], dtype=float)
+_STEP = math.radians(15)  # between points of round faces: their chords are 0.9 % of a radius inside
+_LEVEL = 1e-12  # a component of an axis that counts as none
+_NEAR = 0.05  # of a mesh's diagonal: what axes may miss it by
+
+
+def shape_points(shape: Shape, upright: bool = True) -> Array:
+    """Points (N, 3) [m] whose convex hull is that of a shape, in base axes.
+
+    Args:
+        shape: of numbers.
+        upright: turn COLLADA meshes as their files ask for; see ``honours_up``.
+
+    Raises:
+        InputError: its mesh cannot be read.
+        MissingDependencyError: trimesh is absent.
+    """
+    T = as_array(shape.pose)
+    return _own_points(shape, upright) @ T[:3, :3].T + T[:3, 3]
+
+
+def box_points(box: Box) -> Array:
+    """The corners (8, 3) [m] of a box, in base axes."""
+    return as_array(box.center) + 0.5 * _SIGNS * as_array(box.size)
+
+
+def _own_points(shape: Shape, upright: bool) -> Array:
+    """In the shape's frame."""
+    size = np.array(shape.size, dtype=float)
+    if shape.kind == "mesh":
+        mesh = load_mesh(shape.file)
+        return (mesh.corners @ mesh.turn.T if upright else mesh.corners) * size
+    if shape.kind == "box":
+        return 0.5 * _SIGNS * size
+    radius, half = size[0], size[-1] / 2
+    if shape.kind == "cylinder":
+        return np.concatenate([_ring(radius, end) for end in (-half, half)])
+    if shape.kind == "sphere":
+        return _sphere(radius)
+    return np.concatenate([_sphere(radius) + np.array([0, 0, end]) for end in (-half, half)])
+
+
+def _ring(radius: float, z: float) -> Array:
+    angles = np.arange(0, 2 * math.pi - _STEP / 2, _STEP)
+    return np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(len(angles), z)])
+
+
+def _sphere(radius: float) -> Array:
+    latitudes = np.arange(-math.pi / 2, math.pi / 2 + _STEP / 2, _STEP)
+    rings = [_ring(radius * math.cos(a), radius * math.sin(a)) for a in latitudes[1:-1]]
+    return np.concatenate([*rings, [(0, 0, -radius), (0, 0, radius)]])
+
+
+@dataclass(frozen=True, eq=False)
+class LinkPoints:
+    """Points (N, 3) [m] of every link that has any, in base axes, and remarks on what could not be read."""
+
+    points: Mapping[str, Array]
+    remarks: tuple[str, ...]
+
+
+def link_points(robot: RobotRecord, role: ShapeRole | None = None) -> LinkPoints:
+    """Points of the boxes and shapes of all links; meshes that cannot be read are remarks.
+
+    Args:
+        robot: of numbers.
+        role: of the shapes; None for all of them. Boxes are those of contact: with ``visual`` they stand in
+            where a link has nothing else to show.
+    """
+    upright, unread = honours_up(robot), dict[str, list[str]]()
+    points: dict[str, Array] = {}
+    for link in robot.links:
+        clouds, seen = [], set[object]()
+        for shape in link.shapes:
+            key = (shape.file, *shape.size, *leaves(shape.pose))
+            if role in (None, shape.role) and key not in seen:
+                seen.add(key)
+                try:
+                    clouds.append(shape_points(shape, upright))
+                except (InputError, MissingDependencyError) as wrong:
+                    unread.setdefault(str(wrong), []).append(link.name)
+        if role != "visual" or not clouds:
+            clouds += map(box_points, link.boxes)
+        if clouds:
+            points[link.name] = np.concatenate(clouds)
+    remarks = [f"{text} (of {', '.join(dict.fromkeys(names))})" for text, names in unread.items()]
+    return LinkPoints(points, tuple(remarks))
+
+
+def honours_up(robot: RobotRecord) -> bool:
+    """Whether meshes with another axis up than z are meant to be turned.
+
+    COLLADA files say which axis is up; RViz and Pinocchio ignore it, PyBullet and Blender honour it, and the
+    files of a robot suit either. So the robot decides: the reading in which more of its joints' axes cross,
+    and more of its centres of mass lie within, the boxes around its meshes; as the files say, if both suit.
+    """
+    votes = 0
+    for link in robot.links:
+        for shape in link.shapes:
+            try:
+                if not shape.file.lower().endswith(".dae") or load_mesh(shape.file).is_upright:
+                    continue
+                honoured, ignored = (_suits(robot, link, shape, upright) for upright in (True, False))
+            except (InputError, MissingDependencyError):
+                continue
+            votes += honoured - ignored
+    return votes >= 0
+
+
+def _suits(robot: RobotRecord, link: Link, shape: Shape, upright: bool) -> int:
+    """How many axes of a link's joints, and its CoM, meet the box around one of its meshes."""
+    T, own = as_array(shape.pose), _own_points(shape, upright)
+    low, high = own.min(axis=0), own.max(axis=0)
+    near = _NEAR * np.linalg.norm(high - low)
+    lines = [(as_array(link.com), np.zeros(3))] if link.mass else []
+    lines += [
+        (as_array(joint.screw.s0), as_array(joint.screw.s))
+        for joint in robot.joints
+        if link.name in (joint.parent, joint.child) and joint.type == "revolute"
+    ]
+    R, p = T[:3, :3], T[:3, 3]
+    return sum(_meets((at - p) @ R, s @ R, low - near, high + near) for at, s in lines)
+
+
+def _meets(point: Array, direction: Array, low: Array, high: Array) -> bool:
+    """Whether the line through a point crosses a box, or the point without direction lies in it, by slabs."""
+    along = np.where(np.abs(direction) < _LEVEL, _LEVEL, direction)
+    ends = np.sort(np.array([low - point, high - point]) / along, axis=0)
+    nearest, farthest = ends[0].max(), ends[1].min()
+    return bool(nearest <= farthest and (direction.any() or nearest <= 0.0 <= farthest))
