@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,7 @@ ALIKE = 0.999
 TRIED = 24
 """Directions that are tried, those of the largest facets first."""
 SURE = 0.9
-"""Share of the largest facet that a level one needs to be preferred: what tilts it less is noise of the mesh."""
+"""Share of the largest facet's area from which a level one is preferred: noise tilts it."""
 CORNERS = 8
 """Greatest number of a sole's corners."""
 SLIGHT = 0.01
@@ -47,19 +48,20 @@ def facet_below(points: Array, up: Array, band: float) -> Facet:
         up: (3,) unit vector.
         band: distance from a plane within which points count as in it [m].
     """
-    tried = [_facet(points, normal, band) for normal in (up, *_normals(points, up))]
-    best = max(tried, key=lambda facet: facet.area * float(facet.up @ up) ** 2)
-    return tried[0] if tried[0].area >= SURE * best.area else best
-
-
-def _normals(points: Array, up: Array) -> list[Array]:
-    """Inward normals of the facets of the convex hull that look down, the largest first, similar ones once."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:
         hull = ConvexHull(points)
     except (QhullError, ValueError):
-        return []
+        return _facet(points, up, band)
+    corners = points[hull.vertices]
+    tried = [_facet(corners, normal, band) for normal in (up, *_normals(hull, up))]
+    best = max(tried, key=lambda facet: facet.area * float(facet.up @ up) ** 2)
+    return tried[0] if tried[0].area >= SURE * best.area else best
+
+
+def _normals(hull: Any, up: Array) -> list[Array]:
+    """Inward normals of the facets of a hull that look down, the largest first, similar ones once."""
     inward = -hull.equations[:, :3]
     steep = inward @ up < np.cos(np.radians(STEEP))
     a, b, c = (hull.points[hull.simplices[:, k]] for k in range(3))

@@ -50,8 +50,8 @@ def of_leg(robot: Robot, side: str, foot: Foot, stance: Stance) -> Finding:
     names = [robot.joint_names[i] for i in foot.joints]
     sure = (1 - 0.4 * stance.splay / SPLAYED) * (1 - 0.3 * stance.lean / TOPPLED)
     why = (
-        f"of the mirrored limbs this pair reaches lowest; it points {stance.splay:.0f} deg off the vertical, and"
-        f" the CoM lies {stance.lean:.0f} deg off above its feet"
+        f"of the mirrored limbs this pair reaches lowest; it points {stance.splay:.0f} deg off the vertical,"
+        f" and the CoM lies {stance.lean:.0f} deg off above its feet"
     )
     if foot.toes:
         why += f"; beyond the foot move {_listed(foot.toes)}"
@@ -119,8 +119,8 @@ def of_home(robot: Robot, home: Home, size: float) -> Finding:
 def of_rest(robot: Robot, rest: Sequence[Pair], outline_remarks: Sequence[str]) -> tuple[str, ...]:
     """Mirrored limbs that are neither legs nor arms, and meshes that could not be read."""
     others = [
-        f"the limbs from {robot.joint_names[p.one]} and {robot.joint_names[p.other]} are neither legs nor arms:"
-        " they rest at their posture"
+        f"the limbs from {robot.joint_names[p.one]} and {robot.joint_names[p.other]} are neither legs nor"
+        " arms: they rest at their posture"
         for p in rest
     ]
     return (*others, *outline_remarks)

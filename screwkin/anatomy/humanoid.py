@@ -1,4 +1,4 @@
-"""A humanoid from a robot of unknown names: its limbs, soles and home added, its base turned where it must be."""
+"""A humanoid from a robot of unknown names: limbs, soles and home added, the base turned where it must be."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ def humanoid(robot: Robot) -> Robot:
             has are replaced.
 
     Returns:
-        The robot with limbs ``right_leg left_leg`` and, where it has any, ``right_arm left_arm``; x forward, z
-        up.
+        The robot with limbs ``right_leg left_leg`` and, where it has any, ``right_arm left_arm``; x forward,
+        z up.
 
     Raises:
         AnatomyError: it does not stand on exactly two legs, or this cannot be seen; says why.
@@ -64,7 +64,8 @@ def anatomy(robot: Robot) -> Anatomy:
         AnatomyError: it does not stand on exactly two legs, or this cannot be seen; says why.
     """
     expect(robot, Robot, "robot", "load_robot(...)")
-    skeleton, outline = Skeleton.of(robot), Outline(robot)
+    skeleton = Skeleton.of(robot)
+    outline = Outline(robot, skeleton.size)
     symmetry = symmetry_of(skeleton)
     if symmetry is None:
         raise AnatomyError(
@@ -163,7 +164,7 @@ def _points(places: Array) -> tuple[Vector, ...]:
 
 
 THICK = 0.02
-"""Thickness of the plate that a foot touches the floor with, by the leg's length, where its file has no box."""
+"""Thickness of the plate for contact that a foot without boxes gets, by the leg's length."""
 
 
 def _with_contact(link: Link, at: Footing, length: float) -> Link:
@@ -180,7 +181,7 @@ def _with_contact(link: Link, at: Footing, length: float) -> Link:
     if at.level:
         low, high = at.places.min(axis=0), at.places.max(axis=0)
         center = (low + high) / 2 + (0, 0, thick / 2)
-        boxes = [Box(vector_from_array(center), Vector(*map(float, high[:2] - low[:2]), thick))]
+        boxes = [Box(vector_from_array(center), vector_from_array(np.append((high - low)[:2], thick)))]
     else:
         edge = thick / 4
         boxes = [

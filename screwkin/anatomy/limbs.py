@@ -1,13 +1,14 @@
 """Limbs of a body that has a plane of symmetry: its mirrored branches, and which of them are its legs.
 
-A limb is a branch that has a partner, from the first joint whose line has one. Legs are what a robot can stand on:
-the pair that reaches lowest, below everything else, straight enough below its hips, with the CoM above
-its feet. Which way is down is part of that: of the directions in which the machine is built, the one along
-which all of this fits best.
+A limb is a branch that has a partner, from the first joint whose line has one. Legs are what a robot can
+stand on: the pair that reaches lowest, below everything else, straight enough below its hips, with the CoM
+above its feet. Which way is down is part of that: of the directions in which the machine is built, the one
+along which all of this fits best.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,9 @@ from screwkin.anatomy.outline import Outline
 from screwkin.anatomy.skeleton import Skeleton
 from screwkin.anatomy.symmetry import TILT, Symmetry
 from screwkin.errors import InputError
+
+Surface = Callable[[Iterable[str]], Array]
+"""Points (N, 3) of links."""
 
 LEAST = 3
 """Joints that a limb has at least: with fewer its end cannot be put where it belongs."""
@@ -29,7 +33,11 @@ TOPPLED = 40.0
 
 
 CLEAR = 0.3
-"""Share of a leg's length that the trunk stays clear of the floor: arms hang beside a trunk, legs carry it."""
+"""Share of a leg's length that the trunk is clear of the floor: legs carry it, arms hang beside it."""
+NEARBY = 0.5
+"""Height of a link's CoM, by the leg's length, up to which its surface may reach the floor."""
+HANGS = 0.2
+"""How far the trunk's CoM may be below the hips, by the leg's length: legs carry it, arms flank it."""
 ON_TRUNK = 30.0
 """What counts against a direction in which the trunk is lowest [deg]: what lies on its back stands too."""
 UNUSUAL = (2.0, 5.0)
@@ -60,7 +68,8 @@ class Stance:
         length: from the hips down to the floor [m].
         lean: angle between the way from the feet to the CoM and the vertical [deg].
         splay: angle between the legs and the vertical, within the plane of symmetry [deg].
-        trunk: links of no limb that reach the floor.
+        trunk: links of no limb that reach the floor, or nearly so.
+        hangs: how far the CoM of the trunk is below the hips, by the leg's length.
     """
 
     up: Array
@@ -71,10 +80,11 @@ class Stance:
     lean: float
     splay: float
     trunk: tuple[str, ...]
+    hangs: float
 
 
 def pairs_of(skeleton: Skeleton, symmetry: Symmetry) -> tuple[Pair, ...]:
-    """All pairs of mirrored branches with at least ``LEAST`` joints in a row, from their topmost joints on."""
+    """All pairs of mirrored branches with at least ``LEAST`` joints in a row, from the topmost ones on."""
     found = []
     paired = symmetry.pairs
     for i, joint in enumerate(skeleton.robot.joints):
@@ -95,7 +105,7 @@ def depth(skeleton: Skeleton, joint: int) -> int:
 
 
 def root_of(skeleton: Skeleton, joint: int) -> Array:
-    """Hip or shoulder (3,) of a branch: where its first axis is nearest to the next that is not parallel to it.
+    """Hip or shoulder (3,) of a branch: where its first axis is nearest to the next not parallel to it.
 
     Where all are parallel: nearest to the CoM of what it moves.
     """
@@ -122,9 +132,26 @@ def stance_of(skeleton: Skeleton, symmetry: Symmetry, outline: Outline) -> Stanc
             f"{robot.name}: no two limbs of at least {LEAST} joints are mirror images of one another;"
             " a walk needs two such legs"
         )
-    tried = [_standing(skeleton, symmetry, outline, pairs, up) for up in _upward(skeleton, symmetry)]
-    best = min(tried, key=_unlikely)
-    _refuse_other_floors(skeleton, outline, best)
+    of_limbs = {name for pair in pairs for name in _links(skeleton, pair)}
+
+    def rough(links: Iterable[str]) -> Array:
+        """Points of the trunk; of limbs the CoM of every link."""
+        names = list(links)
+        trunk = [name for name in names if name not in of_limbs]
+        return np.concatenate([outline.of(trunk), outline.roughly(n for n in names if n in of_limbs)])
+
+    tried = [_standing(skeleton, symmetry, rough, pairs, up) for up in _upward(skeleton, symmetry)]
+    first = min(tried, key=_unlikely)
+    near = first.low + NEARBY * abs(first.length)
+
+    def surface(links: Iterable[str]) -> Array:
+        """Points of the trunk and of what of limbs may reach the floor; of other links their CoM."""
+        names = list(links)
+        far = [n for n in names if n in of_limbs and (outline.roughly([n]) @ first.up).min() > near]
+        return np.concatenate([outline.of([n for n in names if n not in far]), outline.roughly(far)])
+
+    best = _standing(skeleton, symmetry, surface, pairs, first.up)
+    _refuse_other_floors(skeleton, surface, best)
     return best
 
 
@@ -138,33 +165,35 @@ def _unlikely(stance: Stance) -> float:
 
 
 def _standing(
-    skeleton: Skeleton, symmetry: Symmetry, outline: Outline, pairs: tuple[Pair, ...], up: Array
+    skeleton: Skeleton, symmetry: Symmetry, surface: Surface, pairs: tuple[Pair, ...], up: Array
 ) -> Stance:
     """The body on the pair that reaches lowest along a direction."""
-    lows = {pair: _low(skeleton, outline, pair, up) for pair in pairs}
+    lows = {pair: _low(skeleton, surface, pair, up) for pair in pairs}
     legs = min(pairs, key=lambda pair: lows[pair])
     others = sorted((pair for pair in pairs if pair is not legs), key=lambda pair: -lows[pair])
     of_limbs = {name for pair in pairs for name in _links(skeleton, pair)}
-    heights = {name: outline.lowest([name], up) for name in skeleton.robot.link_names if name not in of_limbs}
+    of_trunk = [name for name in skeleton.robot.link_names if name not in of_limbs]
+    heights = {name: float((points @ up).min()) for name in of_trunk if len(points := surface([name]))}
     hip = np.mean([root_of(skeleton, i) for i in (legs.one, legs.other)], axis=0)
     length = float(hip @ up) - lows[legs]
     trunk = tuple(name for name in heights if heights[name] < lows[legs] + CLEAR * max(length, 0.0))
     low, ahead = min([lows[legs], *heights.values()]), np.cross(symmetry.normal, up)
-    points = outline.of([*(name for pair in pairs for name in _links(skeleton, pair)), *trunk])
+    points = surface([*(name for pair in pairs for name in _links(skeleton, pair)), *trunk])
     near = points[points @ up <= low + REACH * abs(length)] if len(points) else hip[None]
     foot = float((near @ ahead).mean())
     com = skeleton.place(skeleton.robot.link_names)
     lean = np.degrees(np.arctan2(abs(com @ ahead - foot), com @ up - low))
     splay = np.degrees(np.arctan2(abs(hip @ ahead - foot), length))
-    return Stance(up, legs, tuple(others), low, length, float(lean), float(splay), trunk)
+    hangs = float((hip - skeleton.place(tuple(of_trunk))) @ up) / max(length, 1e-9)
+    return Stance(up, legs, tuple(others), low, length, float(lean), float(splay), trunk, hangs)
 
 
 def _links(skeleton: Skeleton, pair: Pair) -> tuple[str, ...]:
     return (*skeleton.links_beyond(pair.one), *skeleton.links_beyond(pair.other))
 
 
-def _low(skeleton: Skeleton, outline: Outline, pair: Pair, up: Array) -> float:
-    return outline.lowest(_links(skeleton, pair), up)
+def _low(skeleton: Skeleton, surface: Surface, pair: Pair, up: Array) -> float:
+    return float((surface(_links(skeleton, pair)) @ up).min(initial=np.inf))
 
 
 def _upward(skeleton: Skeleton, symmetry: Symmetry) -> Array:
@@ -189,13 +218,13 @@ def _upward(skeleton: Skeleton, symmetry: Symmetry) -> Array:
     return np.array([e, -e, across, -across])
 
 
-def _refuse_other_floors(skeleton: Skeleton, outline: Outline, stance: Stance) -> None:
+def _refuse_other_floors(skeleton: Skeleton, surface: Surface, stance: Stance) -> None:
     """Refuse a body that stands on more than two limbs, on something else, or not at all."""
     robot, names = skeleton.robot, skeleton.robot.joint_names
     floor = stance.low + REACH * stance.length
     if robot.base == "fixed":
         raise AnatomyError(f"{robot.name} is fixed to the world by {robot.base_link}: it stands on no legs")
-    standing = [pair for pair in stance.others if _low(skeleton, outline, pair, stance.up) < floor]
+    standing = [pair for pair in stance.others if _low(skeleton, surface, pair, stance.up) < floor]
     if standing:
         count = 2 * len(standing) + 2
         what = {4: "a quadruped: four limbs", 6: "a hexapod: six limbs"}.get(count, f"{count} limbs")
@@ -205,6 +234,11 @@ def _refuse_other_floors(skeleton: Skeleton, outline: Outline, stance: Stance) -
         on = ", ".join(stance.trunk[:4])
         raise AnatomyError(
             f"{robot.name} stands on {on}, not on two legs: no pair of limbs carries them clear of the floor"
+        )
+    if stance.hangs > HANGS:
+        raise AnatomyError(
+            f"{robot.name} has no legs: its trunk hangs between its lowest limbs (from"
+            f" {names[stance.legs.one]} and {names[stance.legs.other]}), as between arms"
         )
     if stance.splay > SPLAYED or stance.lean > TOPPLED:
         first, second = (names[i] for i in (stance.legs.one, stance.legs.other))

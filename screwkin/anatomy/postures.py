@@ -143,7 +143,7 @@ def _inner(chain: SerialChain, rest: Array, shared: int) -> tuple[Array, Array]:
 def _solved(
     chain: SerialChain, rest: Array, low: Array, high: Array, places: Array, rows: tuple[int, ...]
 ) -> tuple[int, Array] | None:
-    """The first place that the foot can be put at, level; its index and positions (n,), knees forward if they can.
+    """Index of the first place that the foot can be put at, level, and positions (n,), knees forward if any.
 
     Args:
         chain: n joints.

@@ -28,7 +28,7 @@ from screwkin.anatomy.symmetry import Symmetry
 BAND = (0.001, 0.005)
 """Points that close to a plane [m], and by the leg's length, are in it."""
 CARRIES = 0.25
-"""Share of a sole that a link must have of its own for the foot to begin with it: else what it carries is it."""
+"""Share of a sole that a link must have of its own to be the foot; else the foot is what it carries."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,9 +91,9 @@ def _foot(skeleton: Skeleton, stance: Stance, outline: Outline, root: int) -> Fo
     if not with_points:
         raise AnatomyError(
             f"{skeleton.robot.name}: no link of the leg from {skeleton.robot.joint_names[root]} has a shape"
-            " that can be read, so that no sole can be seen; give its meshes, or write limbs and soles yourself"
+            " that can be read, so that no sole can be seen; give its meshes, or write [[limb]] and [[sole]]"
         )
-    lowest = min(with_points, key=lambda name: outline.lowest([name], stance.up))
+    lowest = min(with_points, key=lambda name: float((outline.of([name]) @ stance.up).min()))
     last = skeleton.robot.joint_above[lowest]
     foot = _standing(skeleton, stance, outline, root, last)
     while last != root:

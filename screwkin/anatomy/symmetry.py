@@ -1,9 +1,9 @@
 """The plane of mirror symmetry of a body: the reflection under which most joint lines have partners.
 
-A machine that walks is built twice, left and right, whatever its parts are called. So its lateral plane is the
-reflection that takes most lines (axes without sense) onto the line of *another* joint. Lines that are their own
-image do not count: every line across a plane, or within it, is its own image, and a leg that stands straight has
-all of its axes within its frontal plane.
+A machine that walks is built twice, left and right, whatever its parts are called. So its lateral plane is
+the reflection that takes most lines (axes without sense) onto the line of *another* joint. Lines that are
+their own image do not count: every line across a plane, or within it, is its own image, and a leg that
+stands straight has all of its axes within its frontal plane.
 
 Candidates for the plane's normal are the axes themselves, for some joint of a limb bends it within that
 plane, and the base axes. Where the plane lies is the vote of pairs that stand on one link.
@@ -148,7 +148,7 @@ def _votes(skeleton: Skeleton, normal: Array, i: int, k: int, tolerance: float) 
 
 
 def _matched(skeleton: Skeleton, normal: Array, offset: float) -> Symmetry:
-    """Partners of all joints from the base outwards: partners stand on links that are images of one another."""
+    """Partners of all joints from the base outwards: they stand on links that are images of one another."""
     far = _gaps(skeleton, normal, offset)
     fits = far < _tolerance(skeleton)
     worth: dict[tuple[int, int], int] = {}

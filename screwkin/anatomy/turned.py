@@ -50,7 +50,7 @@ def _shape(box: Box, T_new_old: Pose) -> Shape:
 def _carried(value: T, pose: Pose) -> T:
     """A record in other axes: points move, axes and frames turn, sizes stay."""
     new: Any = value
-    if isinstance(value, Vector) or isinstance(value, Pose):
+    if isinstance(value, Vector | Pose):
         new = pose @ value
     elif isinstance(value, Screw):
         new = carry(pose, value)
@@ -64,4 +64,4 @@ def _carried(value: T, pose: Pose) -> T:
         new = tuple(_carried(item, pose) for item in value)
     elif is_dataclass(value) and not isinstance(value, type):
         new = replace(value, **{f.name: _carried(getattr(value, f.name), pose) for f in fields(value)})
-    return new  # type: ignore[no-any-return]
+    return new
