@@ -101,7 +101,7 @@ def of_waist(robot: Robot, legs: Sequence[Foot], arms: Sequence[Sequence[int]]) 
     return Finding("waist", answer, 1.0 if pelvis == robot.base_link else 0.7, why)
 
 
-def of_home(robot: Robot, home: Home, size: float) -> Finding:
+def of_home(home: Home, size: float) -> Finding:
     """The posture, by what it could not be."""
     sense = "forward" if home.forward else "backwards"
     answer = f"base {1e3 * home.posture.base_height:.0f} mm above the floor, knees bent {sense}"

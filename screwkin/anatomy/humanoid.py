@@ -29,6 +29,7 @@ from screwkin.anatomy.skeleton import Skeleton
 from screwkin.anatomy.soles import Foot, band_of, feet_of
 from screwkin.anatomy.symmetry import Symmetry, symmetry_of
 from screwkin.anatomy.turned import seen_from
+from screwkin.anatomy.written import commented_table
 from screwkin.errors import expect
 from screwkin.kinematics.limits import limits_of
 from screwkin.model.robot import Box, Limb, Link, Robot, Sole
@@ -123,19 +124,28 @@ def _built(
     kinds = [", ".join((foot.link, *foot.toes)) for foot in own]
     both = list(zip(SIDES, own, footing, kinds, strict=True))[::-1]
     sided = list(zip(SIDES, chains if sense > 0 else chains[::-1], strict=True))[::-1]
+    symmetric, faces = findings.of_symmetry(skeleton, symmetry), findings.of_forward(forward)
+    limb_findings = (
+        *(findings.of_leg(whole, side, foot, stance) for side, foot, _, _ in both),
+        *(findings.of_arm(whole, side, chain) for side, chain in sided if chain),
+    )
+    sole_findings = tuple(findings.of_sole(side, foot, at, kind) for side, foot, at, kind in both)
+    waist = findings.of_waist(whole, own, chains)
+    at_home = findings.of_home(home, stance.length)
+    remarks = findings.of_rest(whole, rest, list(outline.remarks))
+    text = commented_table(
+        whole, (symmetric, faces, waist), limb_findings, sole_findings, at_home, remarks
+    )
     return Anatomy(
-        robot=whole,
+        robot=Robot.from_text(text, f"<{whole.name}, limbs added>"),
         turn=turn,
-        symmetry=findings.of_symmetry(skeleton, symmetry),
-        forward=findings.of_forward(forward),
-        limbs=(
-            *(findings.of_leg(whole, side, foot, stance) for side, foot, _, _ in both),
-            *(findings.of_arm(whole, side, chain) for side, chain in sided if chain),
-        ),
-        soles=tuple(findings.of_sole(side, foot, at, kind) for side, foot, at, kind in both),
-        waist=findings.of_waist(whole, own, chains),
-        home=findings.of_home(whole, home, stance.length),
-        remarks=findings.of_rest(whole, rest, list(outline.remarks)),
+        symmetry=symmetric,
+        forward=faces,
+        limbs=limb_findings,
+        soles=sole_findings,
+        waist=waist,
+        home=at_home,
+        remarks=remarks,
     )
 
 

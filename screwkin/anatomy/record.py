@@ -26,7 +26,7 @@ class Anatomy:
     """A humanoid with its limbs, soles and home.
 
     Attributes:
-        robot: with limbs ``right_leg left_leg right_arm left_arm``, tips, soles and ``home``; x forward, z up.
+        robot: with limbs ``right_leg left_leg right_arm left_arm``, tips, soles, ``home``; x forward, z up.
         turn: takes vectors of the base axes as they were to those of ``robot``; unity if they stand as usual.
         limbs: findings by the name of the limb: its links and joints.
         soles: findings by the name of the leg.
