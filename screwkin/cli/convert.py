@@ -58,7 +58,7 @@ def convert(
         raise InputError(f"cannot write {target}: OUT must end with {', '.join(FORMATS)}")
     coupled = one_of("way to read mimic", mimic, MIMICS)
     robot, remarks = _read(source, repair, coupled)
-    text, lost = _written(robot, suffix, chosen)
+    text, lost = _written(robot, target, chosen)
     with atomic_write(target) as file:
         file.write(text)
     remarks += lost
@@ -86,11 +86,12 @@ def _read(source: str, repair: bool, mimic: Mimic) -> tuple[Robot, list[str]]:
     return load_robot(source), []
 
 
-def _written(robot: Robot, suffix: str, convention: Convention) -> tuple[str, list[str]]:
-    """The text of a robot in a format, and remarks on what is lost."""
+def _written(robot: Robot, target: Path, convention: Convention) -> tuple[str, list[str]]:
+    """The text of a robot in the format of a file, and remarks on what is lost."""
+    suffix = target.suffix.lower()
     writers: Mapping[str, Callable[[], str]] = {
-        ".toml": lambda: robot_toml(robot),
-        ".urdf": lambda: urdf_from_robot(robot),
+        ".toml": lambda: robot_toml(robot, target.parent),
+        ".urdf": lambda: urdf_from_robot(robot, target.parent),
         ".csv": lambda: dh_text(derived_tables(robot, convention)),
     }
     lost = {

@@ -9,8 +9,7 @@ from typing import Any, get_args
 import numpy as np
 
 from screwkin.errors import Fault
-from screwkin.model.inertias import negative_moments
-from screwkin.model.records import Inertia, ShapeKind, Sole
+from screwkin.model.records import ShapeKind, Sole
 from screwkin.model.rows import Rows
 from screwkin.model.schema import InertiaRow, JointRow, LinkRow, ShapeRow, SoleRow
 
@@ -63,10 +62,6 @@ def _inertia(inertia: InertiaRow) -> Iterator[tuple[str, str, str]]:
     absent = [name for name in _COMPONENTS[:3] if name not in given]
     if absent:
         yield "inertia", f"{', '.join(absent)} missing", fix
-        return
-    found = negative_moments(Inertia(*(float(getattr(inertia, name)) for name in _COMPONENTS)))
-    if found:
-        yield "inertia", found, "Give the inertia about the CoM in base axes"
 
 
 def _joint(joint: JointRow) -> Iterator[tuple[str, str, str]]:

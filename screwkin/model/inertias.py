@@ -1,7 +1,6 @@
 """Which inertias bodies can have: moments that are not negative, none larger than the sum of the others.
 
-Negative moments are of no use to any formula and are refused. Moments that break the triangle inequality
-only are common in public models, harmless to kinematics and dynamics, and remarks.
+Others are common in public models: every formula takes them as they stand, with a remark.
 """
 
 from __future__ import annotations
@@ -31,17 +30,14 @@ def inertia_from_matrix(matrix: Array) -> Inertia:
     return Inertia(*(float(matrix[pair]) for pair in pairs))
 
 
-def negative_moments(inertia: Inertia) -> str:
-    """What is wrong with an inertia that has a negative principal moment beyond rounding; else nothing."""
+def impossible(inertia: Inertia) -> str:
+    """What is wrong with an inertia that no body has; nothing of one that a body can have.
+
+    A principal moment is negative beyond rounding, or exceeds the sum of the others.
+    """
     a, b, c = np.linalg.eigvalsh(inertia_matrix(inertia))
     if a < -_RELATIVE * abs(c) or c < 0:
         return f"{_figures((a, b, c))} are not all >= 0: no body has them"
-    return ""
-
-
-def broken_triangle(inertia: Inertia) -> str:
-    """What is wrong with an inertia of which one principal moment exceeds the sum of the others."""
-    a, b, c = np.linalg.eigvalsh(inertia_matrix(inertia))
     if c <= (a + b) * (1 + _RELATIVE):
         return ""
     return (

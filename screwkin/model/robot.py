@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any, Self
 
 from screwkin.algebra.scalar import Scalar, is_symbolic
@@ -12,7 +13,7 @@ from screwkin.algebra.se3 import IDENTITY, Pose
 from screwkin.errors import InputError, UnknownNameError, expect, one_of
 from screwkin.model.changes import changed_text, check_followed
 from screwkin.model.display import figure, html_table, listing
-from screwkin.model.inertias import broken_triangle
+from screwkin.model.inertias import impossible
 from screwkin.model.reading import read_table
 from screwkin.model.record_faults import check_records, vars_of
 from screwkin.model.records import (
@@ -120,7 +121,10 @@ class Robot(RobotRecord):
         for what, wanted in wishes.items():
             expect(wanted, Mapping, what, "values by the name of their link or joint")
         text = changed_text(self, robot_text(self), name, parameters, wishes)
-        robot = self.from_text(text, f"<{self.name}, changed>", self.is_symbolic)
+        origin = f"<{self.name}, changed>"
+        if self.path and any(shape.file for link in self.links for shape in link.shapes):
+            origin = str(Path(self.path).with_name(origin))  # where its meshes are named from
+        robot = self.from_text(text, origin, self.is_symbolic)
         check_followed(robot, wishes)
         return robot
 
@@ -267,7 +271,7 @@ class Robot(RobotRecord):
         def raised(link: Link) -> Link:
             i = link.inertia
             raised = Inertia(max(i.xx, inertia), max(i.yy, inertia), max(i.zz, inertia), i.xy, i.xz, i.yz)
-            if broken_triangle(raised):  # a sphere added keeps principal moments those of a body
+            if impossible(raised):  # a sphere added keeps principal moments those of a body
                 more = max(0, inertia - min(i.xx, i.yy, i.zz))
                 raised = Inertia(i.xx + more, i.yy + more, i.zz + more, i.xy, i.xz, i.yz)
             return replace(link, mass=max(link.mass, mass), inertia=raised)

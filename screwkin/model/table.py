@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from screwkin.errors import InputError, RobotRemark, TableError, expect
-from screwkin.model.inertias import broken_triangle
+from screwkin.model.inertias import impossible
 from screwkin.model.library import find_robot
 from screwkin.model.robot import Robot
 from screwkin.model.toml import read_text
@@ -93,7 +93,7 @@ def _read(text: str, name: str, symbolic: bool) -> Robot:
 def _inertia_remarks(robot: Robot) -> Iterator[str]:
     """Links with inertias that no body can have, though every formula takes them."""
     for link in robot.links:
-        if found := broken_triangle(link.inertia):
+        if found := impossible(link.inertia):
             yield f"link {link.name}, key inertia: {found}. Give the inertia about the CoM in base axes"
 
 

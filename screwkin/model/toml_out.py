@@ -9,11 +9,13 @@ import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
+from pathlib import Path
 from typing import Any
 
 from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.se3 import IDENTITY, UNTURNED, ZERO, Pose, Rotation, Vector, leaves
 from screwkin.errors import InputError
+from screwkin.model.mesh_files import short_path
 from screwkin.model.records import Joint, Limb, Link, Posture, RobotRecord, Shape, open_scalars
 from screwkin.model.values import COUPLINGS
 
@@ -21,19 +23,23 @@ _UNLIMITED = {"lower": -math.inf, "upper": math.inf, "velocity": math.inf, "effo
 _GIMBAL = 1e-9  # cosine of the pitch below which roll and yaw turn about the same axis
 
 
-def robot_toml(robot: RobotRecord) -> str:
+def robot_toml(robot: RobotRecord, folder: Path | None = None) -> str:
     """The text of a table for a robot of numbers.
+
+    Args:
+        robot: any robot.
+        folder: where the table will lie: meshes in it or in the folder above have paths from there.
 
     Raises:
         InputError: the robot holds symbols.
     """
     for x in open_scalars(robot):
         raise InputError(f"the robot holds the symbol {x}; load it with numbers to write it")
-    return table_text(table_data(robot))
+    return table_text(table_data(robot, folder))
 
 
-def table_data(robot: RobotRecord) -> dict[str, Any]:
-    """The table of a robot as nested dictionaries, as a TOML reader would return them."""
+def table_data(robot: RobotRecord, folder: Path | None = None) -> dict[str, Any]:
+    """The table of a robot as nested dictionaries, as a TOML reader would return them; see ``robot_toml``."""
     head = {
         "name": robot.name,
         "description": robot.description,
@@ -44,7 +50,7 @@ def table_data(robot: RobotRecord) -> dict[str, Any]:
     origins = {joint.child: joint.screw.s0 for joint in robot.joints}
     data: dict[str, Any] = {
         "robot": {key: value for key, value in head.items() if value},
-        "link": [_link(link, origins.get(link.name, ZERO)) for link in robot.links],
+        "link": [_link(link, origins.get(link.name, ZERO), folder) for link in robot.links],
         "joint": [_joint(joint) for joint in robot.joints],
         "closure": [_row(closure) for closure in robot.closures],
         "limb": [_limb(limb) for limb in robot.limbs],
@@ -92,7 +98,7 @@ def _block(title: str, values: Mapping[str, Any]) -> str:
     )
 
 
-def _link(link: Link, origin: Vector) -> dict[str, Any]:
+def _link(link: Link, origin: Vector, folder: Path | None) -> dict[str, Any]:
     row: dict[str, Any] = {"name": link.name, "mass": link.mass}
     if link.mass or leaves(link.com) != leaves(link.frame.p):
         row["com"] = list(link.com)
@@ -105,14 +111,14 @@ def _link(link: Link, origin: Vector) -> dict[str, Any]:
     if link.boxes:
         row["boxes"] = _plain(link.boxes)
     if link.shapes:
-        row["shapes"] = [_shape(shape) for shape in link.shapes]
+        row["shapes"] = [_shape(shape, folder) for shape in link.shapes]
     return row
 
 
-def _shape(shape: Shape) -> dict[str, Any]:
+def _shape(shape: Shape, folder: Path | None) -> dict[str, Any]:
     row: dict[str, Any] = {"role": shape.role}
     if shape.kind == "mesh":
-        row["mesh"] = shape.file
+        row["mesh"] = short_path(shape.file, folder) if folder else shape.file
         if any(factor != 1 for factor in shape.size):
             row["scale"] = list(shape.size)
     else:

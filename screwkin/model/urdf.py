@@ -10,7 +10,9 @@ float. Tips and soles are massless links fixed to their bodies.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
 from xml.etree import ElementTree
 
 from screwkin.algebra.scalar import Scalar
@@ -27,7 +29,7 @@ from screwkin.algebra.se3 import (
 )
 from screwkin.errors import InputError
 from screwkin.model.inertias import (
-    broken_triangle,
+    impossible,
     inertia_from_matrix,
     inertia_matrix,
     is_flat,
@@ -36,6 +38,7 @@ from screwkin.model.inertias import (
 from screwkin.model.records import Box, Inertia, Joint, Link
 from screwkin.model.robot import Robot
 from screwkin.model.toml_out import rpy_of
+from screwkin.model.urdf_shapes import add_geometry
 
 Colour = tuple[float, float, float, float]
 
@@ -93,8 +96,11 @@ def link_colours(robot: Robot) -> Mapping[str, Colour]:
     return {**colours, robot.base_link: WHITE}
 
 
-def urdf_from_robot(robot: Robot) -> str:
+def urdf_from_robot(robot: Robot, folder: Path | None = None) -> str:
     """The URDF text of a robot: its bodies and joints, and tips and soles as links fixed to their bodies.
+
+    Shapes for pictures are written as they are, boxes instead where a link has none; for collision, boxes and
+    shapes.
 
     Every link has an ``inertial``, massless ones of zeros, as PyBullet would take 1 kg for one without.
     MuJoCo refuses links that move without mass or with inertias that no body has: an element that MuJoCo
@@ -104,15 +110,16 @@ def urdf_from_robot(robot: Robot) -> str:
 
     Args:
         robot: of numbers.
+        folder: where the text will lie: meshes in it or in the folder above have paths from there.
 
     Raises:
         InputError: the robot has helical joints or closures, which URDF cannot say; all are named.
     """
-    return _document(robot, tip_and_sole_frames(robot))
+    return _document(robot, robot.links, tip_and_sole_frames(robot), folder)
 
 
 def urdf_of_bodies(robot: Robot) -> str:
-    """The URDF text of a robot's links and joints alone, as ``urdf_from_robot`` writes them.
+    """The URDF text of a robot's links, of which only boxes are solid and seen, and of its joints.
 
     Args:
         robot: of numbers.
@@ -120,10 +127,12 @@ def urdf_of_bodies(robot: Robot) -> str:
     Raises:
         InputError: the robot has helical joints or closures, which URDF cannot say; all are named.
     """
-    return _document(robot, {})
+    return _document(robot, [replace(link, shapes=()) for link in robot.links], {}, None)
 
 
-def _document(robot: Robot, fixed: Mapping[str, tuple[str, Pose]]) -> str:
+def _document(
+    robot: Robot, links: Sequence[Link], fixed: Mapping[str, tuple[str, Pose]], folder: Path | None
+) -> str:
     _refuse_what_urdf_cannot_say(robot)
     root = ElementTree.Element("robot", name=robot.name)
     frames, colours = urdf_frames(robot), link_colours(robot)
@@ -133,8 +142,8 @@ def _document(robot: Robot, fixed: Mapping[str, tuple[str, Pose]]) -> str:
     for colour in dict.fromkeys(colours.values()):
         material = ElementTree.SubElement(root, "material", name=palette[colour])
         ElementTree.SubElement(material, "color", rgba=" ".join(map(repr, colour)))
-    for link in robot.links:
-        _add_link(root, link, frames[link.name], palette[colours[link.name]])
+    for link in links:
+        _add_link(root, link, frames[link.name], palette[colours[link.name]], folder)
     for joint in robot.joints:
         _add_joint(root, joint, frames)
     for name, (body, pose) in fixed.items():
@@ -146,10 +155,12 @@ def _document(robot: Robot, fixed: Mapping[str, tuple[str, Pose]]) -> str:
 def _mujoco_options(robot: Robot) -> dict[str, str]:
     """What MuJoCo must be asked for to load inertias that it refuses: least moments, and balanced ones."""
     options: dict[str, str] = {}
+    if any(shape.file for link in robot.links for shape in link.shapes):
+        options["strippath"] = "false"
     for link in robot.links:
         if link.name != robot.base_link and (link.mass == 0 or is_flat(link.inertia)):
             options |= _BOUNDS
-        if broken_triangle(link.inertia):
+        if impossible(link.inertia):
             options["balanceinertia"] = "true"
     return options
 
@@ -188,13 +199,19 @@ def _add_inertial(link: ElementTree.Element, com: Vector, mass: Scalar, inertia:
     ElementTree.SubElement(inertial, "inertia", {name: _number(value) for name, value in names.items()})
 
 
-def _add_link(root: ElementTree.Element, link: Link, frame: Pose, material: str) -> None:
+def _add_link(root: ElementTree.Element, link: Link, frame: Pose, material: str, folder: Path | None) -> None:
     element = ElementTree.SubElement(root, "link", name=link.name)
     back = frame.inverse
     _add_inertial(element, back @ link.com, link.mass, _turned(link.inertia, back.R))
+    pictures = any(shape.role == "visual" for shape in link.shapes)
     for box in link.boxes:
-        ElementTree.SubElement(_add_box(element, "visual", box, back), "material", name=material)
+        if not pictures:
+            ElementTree.SubElement(_add_box(element, "visual", box, back), "material", name=material)
         _add_box(element, "collision", box, back)
+    for shape in link.shapes:
+        seen = ElementTree.SubElement(element, shape.role)
+        _add_origin(seen, back @ shape.pose)
+        add_geometry(seen, shape, folder)
 
 
 def _turned(inertia: Inertia, R: Rotation) -> Inertia:

@@ -20,11 +20,10 @@ from screwkin.algebra.screws import INFINITE, Screw
 from screwkin.algebra.se3 import IDENTITY, Pose, as_array, vector_from_array
 from screwkin.errors import TableError
 from screwkin.model.inertias import (
-    broken_triangle,
+    impossible,
     inertia_from_matrix,
     inertia_matrix,
     nearest_body,
-    negative_moments,
     without_noise,
 )
 from screwkin.model.records import Box, Inertia, Joint, Link, RobotRecord, Shape
@@ -51,7 +50,7 @@ _KEPT = {
     "joint": {"origin", "parent", "child", "axis", "limit", "mimic"},
 }
 _NO_NAME = re.compile(r"[^A-Za-z0-9_-]+")
-_IMPOSSIBLE = "inertia read as it stands though no body has it (to repair: convert --repair)"
+_IMPOSSIBLE = "inertia read as it stands, though no body has it (to repair: convert --repair)"
 _REPAIRED = "inertia that no body has, replaced by the nearest that one can have"
 
 
@@ -130,12 +129,8 @@ def parse_urdf(text: str, path: str = "<text>", repair: bool = False, mimic: Mim
 def _audit_bodies(
     reader: Reader, bodies: Sequence[_Body], parts: Sequence[Link], base: str, names: Mapping[str, str]
 ) -> None:
-    """Negative moments of a whole body are faults; moving without mass, and merged links, are remarks."""
+    """Moving without mass, and merged links, are remarks."""
     for body, part in zip(bodies, parts, strict=True):
-        if found := negative_moments(part.inertia):
-            row = f"<link> {', '.join(map(repr, body.negative)) or repr(body.name)}"
-            fix = "Write moments about the CoM in the axes of <inertial>, or repair it: convert --repair"
-            reader.fault(row, "inertia", found, fix)
         if len(body.poses) > 1:
             merged = [name for name in body.poses if names[name] != body.name]
             reader.note("merged, as fixed to one another", f"{' + '.join(merged)} into {body.name}")
@@ -153,16 +148,12 @@ def _note_left_out(reader: Reader, root: Element, joints: Iterable[Edge]) -> Non
 
 @dataclass
 class _Body:
-    """Links that fixed joints hold together: their poses, masses with CoM and inertia in base axes, shapes.
-
-    ``negative`` lists those with negative moments of inertia.
-    """
+    """Links that fixed joints hold together: poses, masses with CoM and inertia, boxes, shapes; base axes."""
 
     name: str
     frame: Pose
     poses: dict[str, Pose]
     masses: list[tuple[float, Array, Array]] = field(default_factory=list)
-    negative: list[str] = field(default_factory=list)
     boxes: list[Box] = field(default_factory=list)
     shapes: list[Shape] = field(default_factory=list)
 
@@ -216,8 +207,6 @@ def _add_mass(reader: Reader, body: _Body, name: str, link: Element, repair: boo
     inertia = _audited(reader, name, Inertia(*moments), mass, repair)
     if mass > 0 and not inertia_matrix(inertia).any():
         reader.note("mass without inertia, taken as a point", name)
-    if negative_moments(inertia):
-        body.negative.append(name)
     R = as_array(here.R)
     body.masses.append((mass, as_array(here.p), R @ inertia_matrix(inertia) @ R.T))
 
@@ -227,7 +216,7 @@ def _audited(reader: Reader, name: str, inertia: Inertia, mass: float, repair: b
     clean = without_noise(inertia, mass)
     if clean is not inertia:
         reader.note("moments of inertia as small as rounding, taken as 0", name)
-    if found := negative_moments(clean) or broken_triangle(clean):
+    if found := impossible(clean):
         reader.note(_REPAIRED if repair else _IMPOSSIBLE, f"{name} has {found}")
         return nearest_body(clean) if repair else clean
     return clean
@@ -286,6 +275,9 @@ def _bounds(reader: Reader, edge: Edge) -> tuple[float, float]:
         reader.note("one limit only, the other one read as 0, or as none beyond it", edge.name)
         if lower > upper:
             lower, upper = (lower, math.inf) if "lower" in given else (-math.inf, upper)
+    elif lower > upper:
+        reader.note("lower limit above the upper one, read as free", edge.name)
+        return -math.inf, math.inf
     elif lower == upper:
         reader.note("lower and upper limit are equal, so that it cannot move", edge.name)
     return (

@@ -1,4 +1,4 @@
-"""What the links of a URDF file look like and occupy: boxes for contact, and all other shapes beside them."""
+"""What the links of a URDF file look like and occupy, in and out: boxes for contact, and all other shapes."""
 
 from __future__ import annotations
 
@@ -6,22 +6,23 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 
 from screwkin.algebra.se3 import Pose, as_array, leaves, vector_from_array
-from screwkin.model.mesh_files import find_mesh
+from screwkin.model.mesh_files import find_mesh, short_path
 from screwkin.model.records import Box, Shape, ShapeRole
 from screwkin.model.urdf_xml import Element, Reader
 
 _WHOLE = 1e-9  # how far a turned box may be from the base axes
 _NOT_FOUND = "mesh files not found, so neither seen nor measured"
-_FLAT = "shapes without extent, left out"
-_KEYS: Mapping[str, tuple[tuple[str, int], ...]] = {
-    "box": (("size", 3),),
-    "cylinder": (("radius", 1), ("length", 1)),
-    "capsule": (("radius", 1), ("length", 1)),
-    "sphere": (("radius", 1),),
+_NO_SIZE = "shapes left out, of an unknown kind or without an extent"
+_KEYS: Mapping[str, Mapping[str, int]] = {
+    "box": {"size": 3},
+    "cylinder": {"radius": 1, "length": 1},
+    "capsule": {"radius": 1, "length": 1},
+    "sphere": {"radius": 1},
 }
 
 
@@ -60,44 +61,24 @@ class ShapeReader:
         return boxes, [*rest, *(shape for shape in collision if not _is_straight(shape))]
 
     def _read(self, name: str, link: Element, role: ShapeRole, pose: Pose) -> Iterator[Shape]:
-        row = f"<link> {name!r}"
         for element in link.findall(role):
-            here = pose @ self.reader.origin(row, element)
+            here = pose @ self.reader.origin(f"<link> {name!r}", element)
             geometry = element.find("geometry")
             for solid in () if geometry is None else geometry:
-                colour = self._colour(element.find("material"))
-                if solid.tag == "mesh":
-                    yield from self._mesh(row, name, role, here, solid, colour)
-                elif solid.tag in _KEYS:
-                    yield from self._solid(row, name, role, here, solid, colour)
-                else:
-                    self.reader.note("shapes of an unknown kind, left out", f"{solid.tag} of {name}")
+                kind, size, file = str(solid.tag), _size(solid), solid.get("filename", "").strip()
+                if not size or (kind == "mesh" and not file):
+                    self.reader.note(_NO_SIZE, f"{kind} of {name}")
+                    continue
+                if kind == "mesh":
+                    file = self._found(file)
+                yield Shape(role, solid.tag, here, size, file, self._colour(element.find("material")))
 
-    def _solid(
-        self, row: str, name: str, role: ShapeRole, pose: Pose, solid: Element, colour: tuple[float, ...]
-    ) -> Iterator[Shape]:
-        size: list[float] = []
-        for key, count in _KEYS[solid.tag]:
-            if solid.get(key) is None:
-                self.reader.fault(row, key, f"is missing of a {solid.tag}", f"Write {key}=... in m")
-                return
-            size += self.reader.numbers(row, solid, key, (1.0,) * count)
-        if min(size) <= 0:
-            self.reader.note(_FLAT, f"{solid.tag} of {name}")
-        else:
-            yield Shape(role, solid.tag, pose, tuple(size), colour=colour)
-
-    def _mesh(
-        self, row: str, name: str, role: ShapeRole, pose: Pose, mesh: Element, colour: tuple[float, ...]
-    ) -> Iterator[Shape]:
-        uri, scale = mesh.get("filename", ""), self.reader.numbers(row, mesh, "scale", (1.0, 1.0, 1.0))
-        if not uri.strip() or 0 in scale:
-            self.reader.note(_FLAT, f"mesh of {name}")
-            return
+    def _found(self, uri: str) -> str:
+        """The path of a mesh, or its URI with a remark."""
         path = find_mesh(uri, self.folder)
         if path is None:
             self.reader.note(_NOT_FOUND, uri)
-        yield Shape(role, "mesh", pose, tuple(scale), uri if path is None else str(path), colour)
+        return uri if path is None else str(path)
 
     def _colour(self, material: Element | None) -> tuple[float, ...]:
         """Of a material that says it, or of the file's of that name; none where neither does."""
@@ -113,15 +94,55 @@ def shape_reader(reader: Reader, root: Element, folder: Path) -> ShapeReader:
 
 
 def _rgb(material: Element) -> tuple[float, ...]:
-    """Red, green and blue of a material; none where it has no colour, for pictures are never refused."""
+    """Red, green and blue of a material, with or without its alpha; none where it has no colour."""
     colour = material.find("color")
+    text = "" if colour is None else colour.get("rgba", "")
+    return tuple(min(1.0, max(0.0, number)) for number in _numbers(" ".join(text.split()[:3]), 3))
+
+
+def _size(solid: Element) -> tuple[float, ...]:
+    """Lengths of a solid, factors of a mesh; none where they are missing, malformed or no extent."""
+    if solid.tag == "mesh":
+        scale = _numbers(solid.get("scale", "1 1 1"), 3)
+        return () if 0 in scale else scale
+    keys = _KEYS.get(str(solid.tag), {})
+    read = [_numbers(solid.get(key, ""), count) for key, count in keys.items()]
+    size = tuple(number for numbers in read for number in numbers)
+    return size if all(read) and min(size, default=0) > 0 else ()
+
+
+def _numbers(text: str, count: int) -> tuple[float, ...]:
+    """So many finite numbers, or none: pictures are never refused."""
     try:
-        numbers = [float(word) for word in ("" if colour is None else colour.get("rgba", "")).split()[:3]]
+        numbers = tuple(float(word) for word in text.split())
     except ValueError:
         return ()
-    if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
-        return ()
-    return tuple(min(1.0, max(0.0, number)) for number in numbers)
+    return numbers if len(numbers) == count and all(map(math.isfinite, numbers)) else ()
+
+
+def add_geometry(element: ElementTree.Element, shape: Shape, folder: Path | None) -> None:
+    """Write what a shape is into its element, ``visual`` or ``collision``.
+
+    Args:
+        element: of the shape.
+        shape: of numbers.
+        folder: of the file that is written; None to name meshes by their whole paths.
+    """
+    size = [repr(float(number)) for number in shape.size]
+    if shape.kind == "mesh":
+        given = {
+            "filename": short_path(shape.file, folder) if folder else shape.file,
+            "scale": " ".join(size),
+        }
+    elif shape.kind == "box":
+        given = {"size": " ".join(size)}
+    else:
+        given = dict(zip(_KEYS[shape.kind], size, strict=True))
+    ElementTree.SubElement(ElementTree.SubElement(element, "geometry"), shape.kind, given)
+    if shape.colour:
+        rgb = [repr(float(c)) for c in shape.colour]
+        material = ElementTree.SubElement(element, "material", name="_".join(["rgb", *rgb]))
+        ElementTree.SubElement(material, "color", rgba=" ".join([*rgb, "1.0"]))
 
 
 def _is_straight(shape: Shape) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -15,6 +16,7 @@ from screwkin.model.records import Link, Shape
 from screwkin.model.robot import Robot
 from screwkin.model.shapes import honours_up, link_points, shape_points
 from screwkin.model.toml_out import robot_toml
+from screwkin.model.urdf import urdf_from_robot, urdf_of_bodies
 from screwkin.model.urdf_in import load_urdf, parse_urdf
 from tests.model.meshes import CORNERS, write_dae, write_stl
 from tests.model.urdf_texts import ARM
@@ -63,12 +65,12 @@ def test_shapes_stand_where_pinocchio_places_them(path):
     assert link.shapes[1].file == str(path.parent / "meshes" / "a.stl")
 
 
-def assert_same_shapes(ours: Link, theirs: Link) -> None:
+def assert_same_shapes(ours: Link, theirs: Link, close: float = 1e-15) -> None:
     assert [replace(shape, pose=IDENTITY) for shape in ours.shapes] == [
         replace(shape, pose=IDENTITY) for shape in theirs.shapes
     ]
     for one, other in zip(ours.shapes, theirs.shapes, strict=True):
-        np.testing.assert_allclose(as_array(one.pose), as_array(other.pose), rtol=0, atol=1e-15)
+        np.testing.assert_allclose(as_array(one.pose), as_array(other.pose), rtol=0, atol=close)
 
 
 def test_a_table_holds_the_shapes_and_reads_back_equal(path):
@@ -79,6 +81,35 @@ def test_a_table_holds_the_shapes_and_reads_back_equal(path):
     near.write_text(text.replace(str(path.parent) + "/", ""))
     assert 'mesh = "meshes/a.stl"' in near.read_text()
     assert_same_shapes(sk.load_robot(near).link("upper"), robot.link("upper"))
+
+
+def test_a_changed_robot_still_has_the_meshes_that_its_table_names_from_its_folder(path):
+    near = path.with_suffix(".toml")
+    near.write_text(robot_toml(load_urdf(path).robot, near.parent))
+    changed = sk.load_robot(near).replace(masses={"upper": 3})
+    assert changed.link("upper").shapes[1].file == str(path.parent / "meshes" / "a.stl")
+    assert changed.text_matches
+
+
+def test_a_urdf_written_shows_and_collides_as_the_one_read(path):
+    """Read again it is the same; Pinocchio and MuJoCo read it as written."""
+    robot = load_urdf(path).robot
+    written = path.with_name("written.urdf")
+    written.write_text(urdf_from_robot(robot, path.parent))
+    assert 'filename="meshes/a.stl"' in written.read_text()
+    again = load_urdf(written).robot.link("upper")
+    assert_same_shapes(again, robot.link("upper"), 1e-14)
+    np.testing.assert_allclose(*[[as_array(b.center) for b in x.boxes] for x in (again, robot.link("upper"))])
+    model = pin.buildModelFromXML(written.read_text())
+    geometry = pin.buildGeomFromUrdf(model, str(written), pin.VISUAL, package_dirs=[str(path.parent)])
+    assert geometry.ngeoms == 2
+    assert mujoco.MjModel.from_xml_path(str(written)).ngeom == 3
+
+
+def test_simulators_get_boxes_alone(path):
+    text = urdf_of_bodies(load_urdf(path).robot)
+    assert "mesh" not in text
+    assert text.count("<box") == 2
 
 
 @pytest.mark.parametrize("turned", [False, True])
