@@ -133,20 +133,8 @@ def _built(
     waist = findings.of_waist(whole, own, chains)
     at_home = findings.of_home(home, stance.length)
     remarks = findings.of_rest(whole, rest, list(outline.remarks))
-    text = commented_table(
-        whole, (symmetric, faces, waist), limb_findings, sole_findings, at_home, remarks
-    )
-    return Anatomy(
-        robot=Robot.from_text(text, f"<{whole.name}, limbs added>"),
-        turn=turn,
-        symmetry=symmetric,
-        forward=faces,
-        limbs=limb_findings,
-        soles=sole_findings,
-        waist=waist,
-        home=at_home,
-        remarks=remarks,
-    )
+    found = Anatomy(whole, turn, symmetric, faces, limb_findings, sole_findings, waist, at_home, remarks)
+    return replace(found, robot=Robot.from_text(commented_table(found), robot.path))
 
 
 def _leg(robot: Robot, side: str, foot: Foot, at: Footing) -> Limb:

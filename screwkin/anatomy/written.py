@@ -3,44 +3,34 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from pathlib import Path
 
-from screwkin.anatomy.record import Finding
-from screwkin.model.robot import Robot
+from screwkin.anatomy.record import Anatomy
 from screwkin.model.toml_out import robot_toml
 
 WIDTH = 108
 HEAD = (
-    "Limbs, soles and the posture home were read off the robot's geometry, without regard to names. The number"
-    " in brackets says how sure each is, from 0 to 1. Look them over, correct what is wrong, then take these"
+    "Limbs, soles and the posture home were read off the robot's geometry, without regard to names. The"
+    " number in brackets says how sure each is, from 0 to 1. Look them over, correct what is wrong, then take these"
     " comments out. Units are m, kg, rad, s, N m; x points forward, y to the left, z up."
 )
 
 
-def commented_table(
-    robot: Robot,
-    general: Sequence[Finding],
-    limbs: Sequence[Finding],
-    soles: Sequence[Finding],
-    home: Finding,
-    remarks: Sequence[str],
-) -> str:
+def commented_table(found: Anatomy, folder: Path | None = None) -> str:
     """The text of a table whose limbs, soles and home say how sure they are and why.
 
     Args:
-        robot: with limbs, soles and the posture ``home``.
-        general: findings about the robot as a whole, for the head of the table.
-        limbs: findings about limbs, by their names.
-        soles: findings about soles, by the names of their limbs.
-        home: about the posture.
-        remarks: for the head.
+        found: about a robot.
+        folder: where the table will lie, so that meshes near it have short paths.
     """
-    notes = {f'[[limb]]\nname = "{finding.about}"': finding for finding in limbs}
-    notes |= {f'[[sole]]\nlimb = "{finding.about}"': finding for finding in soles}
-    notes['[[posture]]\nname = "home"'] = home
-    head = [HEAD, *map(str, general), *(f"Remark: {remark}" for remark in remarks)]
+    notes = {f'[[limb]]\nname = "{finding.about}"': finding for finding in found.limbs}
+    notes |= {f'[[sole]]\nlimb = "{finding.about}"': finding for finding in found.soles}
+    notes['[[posture]]\nname = "home"'] = found.home
+    general = (found.symmetry, found.forward, found.waist)
+    head = [HEAD, *map(str, general), *(f"Remark: {remark}" for remark in found.remarks)]
     blocks = ["\n".join(line for text in head for line in _comment(text))]
-    for block in robot_toml(robot).rstrip("\n").split("\n\n"):
+    for block in robot_toml(found.robot, folder).rstrip("\n").split("\n\n"):
         note = next((finding for start, finding in notes.items() if block.startswith(start)), None)
         blocks.append("\n".join([*(_comment(str(note)) if note else ()), block]))
     return "\n\n".join(blocks) + "\n"
