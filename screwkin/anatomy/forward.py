@@ -55,7 +55,7 @@ def forward_of(skeleton: Skeleton, symmetry: Symmetry, stance: Stance, feet: tup
         if abs(value) > 0.05
     ]
     known = sum(WEIGHTS[name] for name, sign in signs.items() if abs(sign) > 0.05)
-    confidence = 0.5 + 0.5 * min(1.0, abs(total)) * (abs(total) / known if known else 0.0)
+    confidence = 0.5 + 0.5 * min(1.0, abs(total)) * (min(1.0, abs(total) / known) if known else 0.0)
     return Forward(
         sense * ahead, round(confidence, 2), "; ".join(why) or "nothing shows it: the base's x axis"
     )
@@ -82,11 +82,7 @@ def _knee(skeleton: Skeleton, foot: Foot, normal: Array) -> float:
     across = [i for i in foot.joints if abs(skeleton.s[i] @ normal) > 1 - 10 * TILT and skeleton.turns[i]]
     if len(across) < 2:
         return 0.0
-    middle = (
-        skeleton.robot.joints[across[len(across) // 2]]
-        if len(across) > 2
-        else skeleton.robot.joints[across[1]]
-    )
+    middle = skeleton.robot.joints[across[len(across) // 2]]
     lower, upper = (float(np.clip(x, -np.pi, np.pi)) for x in (middle.lower, middle.upper))
     sense = np.sign(float(skeleton.s[skeleton.robot.joint_above[middle.child]] @ normal))
     return float(sense * (upper + lower) / (upper - lower)) if upper > lower else 0.0

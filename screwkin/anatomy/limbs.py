@@ -133,23 +133,18 @@ def stance_of(skeleton: Skeleton, symmetry: Symmetry, outline: Outline) -> Stanc
             " a walk needs two such legs"
         )
     of_limbs = {name for pair in pairs for name in _links(skeleton, pair)}
-
-    def rough(links: Iterable[str]) -> Array:
-        """Points of the trunk; of limbs the CoM of every link."""
-        names = list(links)
-        trunk = [name for name in names if name not in of_limbs]
-        return np.concatenate([outline.of(trunk), outline.roughly(n for n in names if n in of_limbs)])
-
-    tried = [_standing(skeleton, symmetry, rough, pairs, up) for up in _upward(skeleton, symmetry)]
-    first = min(tried, key=_unlikely)
-    near = first.low + NEARBY * abs(first.length)
+    looked_at = set(robot.link_names) - of_limbs
 
     def surface(links: Iterable[str]) -> Array:
-        """Points of the trunk and of what of limbs may reach the floor; of other links their CoM."""
+        """Points of links that are looked at; of others, and of those without surface, the CoM."""
         names = list(links)
-        far = [n for n in names if n in of_limbs and (outline.roughly([n]) @ first.up).min() > near]
-        return np.concatenate([outline.of([n for n in names if n not in far]), outline.roughly(far)])
+        bare = [n for n in names if n not in looked_at or not len(outline.of([n]))]
+        return np.concatenate([outline.of(n for n in names if n not in bare), outline.roughly(bare)])
 
+    tried = [_standing(skeleton, symmetry, surface, pairs, up) for up in _upward(skeleton, symmetry)]
+    first = min(tried, key=_unlikely)
+    near = first.low + NEARBY * abs(first.length)
+    looked_at |= {n for n in of_limbs if (outline.roughly([n]) @ first.up).min() <= near}
     best = _standing(skeleton, symmetry, surface, pairs, first.up)
     _refuse_other_floors(skeleton, surface, best)
     return best

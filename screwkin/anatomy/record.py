@@ -18,7 +18,7 @@ class Finding:
     why: str
 
     def __str__(self) -> str:
-        return f"{self.about}: {self.answer} ({self.confidence:.2f}). {self.why}"
+        return f"{self.about}: {self.answer}. Confidence {self.confidence:.2f}: {self.why}."
 
 
 @dataclass(frozen=True, eq=False)
