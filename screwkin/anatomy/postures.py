@@ -8,6 +8,7 @@ begins from its image.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -26,7 +27,11 @@ BEND = 0.94
 ROOM = 0.02
 """Share of a joint's range that home keeps from its limits."""
 HEIGHTS = np.linspace(1.3, 0.4, 37)
-"""Heights of the hips above the floor that are tried, by that of the zero pose, the highest first."""
+"""Heights of the hips above the ankles that are tried, by that of the zero pose, the highest first."""
+STILL = 1e-8
+"""Distance of the CoM from the middle of the soles, by the leg's length, that counts as none."""
+ROUNDS = 12
+"""Steps in which the feet are put below the CoM, which moves with them: each leaves a tenth or so."""
 BENDS = (0.3, 0.8, 1.4)
 """Half the bend of the knees in the postures that solutions start from [rad]."""
 ARRIVED = 1e-9
@@ -89,147 +94,133 @@ def home_of(legs: Legs, rest: Array) -> Home:
     Raises:
         NoSolutionError: within their limits, the legs cannot stand with level soles at any height.
     """
-    robot, chain = legs.robot, SerialChain.of(legs.robot, "left_leg")
-    own = list(chain.joints)
-    low, high = _inner(chain, rest[own], legs.shared)
-    start = chain.tip.p
-    parts = [rows for rows in PARTS if (rows[0] == 3) == legs.points and len(rows) <= max(3, len(own))] or [
-        PARTS[-1]
-    ]
-    q, height, rows = None, 0.0, parts[0]
-    length = legs.hip - float(start.z)
-    for rows in parts:
-        heights = legs.ankle + (length - legs.ankle) * HEIGHTS
-        places = np.array([[float(start.x), float(start.y), legs.hip - h] for h in heights])
-        found = _solved(chain, rest[own], low, high, places, rows)
-        if found is not None:
-            k, q = found
-            height = heights[k]
-            break
-    if q is None:
+    robot, side = legs.robot, _Side.of(legs, "left_leg", rest)
+    start = side.chain.tip.p
+    length = legs.hip - float(start.z) - legs.ankle
+    heights = legs.ankle + length * HEIGHTS
+    places = np.array([[float(start.x), float(start.y), legs.hip - h] for h in heights])
+    parts = [rows for rows in PARTS if (rows[0] == 3) == legs.points]
+    fitting = [rows for rows in parts if len(rows) <= len(side.own)] or parts[-1:]
+    found = next((one for rows in fitting if (one := side.solved(places, rows, side.starts))), None)
+    if found is None:
         raise NoSolutionError(
             f"{robot.name}: within their limits, the legs cannot stand with level soles at any height"
         )
+    height, q, rows = heights[found.place], found.q, found.rows
     bent = legs.ankle + BEND * (height - legs.ankle)
-    base_height, x, off = bent - legs.hip, float(start.x), np.nan
-    whole = rest.copy()
-    for _ in range(5):
-        place = np.array([[x, float(start.y), -base_height]])
-        found = _solved(chain, rest[own], low, high, place, rows)
+    place, off = np.array([float(start.x), float(start.y), legs.hip - bent]), np.inf
+    starts = side.starts
+    for _ in range(ROUNDS):
+        found = side.solved(place[None], rows, starts)
         if found is None:
             break
-        whole = _both(legs, chain, rest, found[1], place[0], rows)
-        com = center_of_mass(robot, State(np.eye(4), whole))
+        q, starts = found.q, found.q[None]
+        com = center_of_mass(robot, State(np.eye(4), _both(legs, rest, q, place, rows)))
         wanted = float(com[0]) - legs.middle[0]
-        off = abs(wanted - x)
-        if off < 1e-4 * length:
+        off = abs(wanted - place[0])
+        if off < STILL * length:
             break
-        x = wanted
-    knee = _knee(chain, whole[own])
-    return Home(
-        Posture("home", float(base_height), tuple(map(float, whole))), rows, knee >= 0, off, height / bent
-    )
+        place[0] = wanted
+    whole = _both(legs, rest, q, place, rows)
+    posture = Posture("home", bent - legs.hip, tuple(map(float, whole)))
+    return Home(posture, rows, side.knee(q) >= 0, off, height / bent)
 
 
-def _inner(chain: SerialChain, rest: Array, shared: int) -> tuple[Array, Array]:
-    """Limits (n,) with some room; the joints that the legs share rest."""
-    low, high = (np.clip(end, -np.pi, np.pi) for end in (chain.lower, chain.upper))
-    room = ROOM * (high - low)
-    low, high = low + room, high - room
-    low[:shared] = high[:shared] = rest[:shared]
-    return low, high
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """The first place that a foot can be put at: its index, positions (n,), and what was imposed."""
+
+    place: int
+    q: Array
+    rows: tuple[int, ...]
 
 
-def _solved(
-    chain: SerialChain, rest: Array, low: Array, high: Array, places: Array, rows: tuple[int, ...]
-) -> tuple[int, Array] | None:
-    """Index of the first place that the foot can be put at, level, and positions (n,), knees forward if any.
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """One leg: its chain, its joints, their limits with some room and their resting positions."""
 
-    Args:
-        chain: n joints.
-        rest: (n,) positions that bends are added to.
-        low: limits (n,).
-        high: limits (n,).
-        places: (B, 3) of the tip [m].
-        rows: coordinates that count.
-    """
-    starts = _starts(chain, rest)
-    x0 = np.clip(np.tile(starts, (len(places), 1)), low, high)
-    at = np.repeat(np.arange(len(places)), len(starts))
-    target = np.tile(np.eye(4), (len(x0), 1, 1))
-    target[:, :3, 3] = places[at]
-    weights = np.array([1, 1, 1, *(3 * (1 / chain.length,))])[list(rows)]
+    chain: SerialChain
+    own: list[int]
+    low: Array
+    high: Array
+    rest: Array
 
-    def lack(x: Array, samples: Array) -> tuple[Array, Array]:
-        r, J = residual(chain, x, target[samples])
-        return r[:, rows] * weights, J[:, rows] * weights[:, None]
+    @classmethod
+    def of(cls, legs: Legs, limb: str, rest: Array) -> _Side:
+        """The joints that the legs share rest."""
+        chain = SerialChain.of(legs.robot, limb)
+        own = list(chain.joints)
+        low, high = (np.clip(end, -np.pi, np.pi) for end in (chain.lower, chain.upper))
+        room = ROOM * (high - low)
+        low, high, at_rest = low + room, high - room, rest[own]
+        low[: legs.shared] = high[: legs.shared] = at_rest[: legs.shared]
+        return cls(chain, own, low, high, at_rest)
 
-    result = bounded_least_squares(lack, x0, low, high, ARRIVED / 10)
-    good = np.flatnonzero(result.residual < ARRIVED)
-    if not len(good):
-        return None
-    first = at[good].min()
-    options = [k for k in good if at[k] == first]
-    best = max(
-        options,
-        key=lambda k: (
-            round(_knee(chain, result.x[k]) / chain.length, 3) >= 0,
-            -round(float(np.abs(result.x[k] - rest).sum()), 6),
-        ),
-    )
-    return int(first), result.x[best]
+    def solved(self, places: Array, rows: tuple[int, ...], starts: Array) -> _Solved | None:
+        """The foot level at the first place (B, 3) [m] that it reaches, knees forward if possible.
+
+        Args:
+            places: of the tip [m].
+            rows: coordinates that count.
+            starts: positions (k, n) to begin from.
+        """
+        at = np.repeat(np.arange(len(places)), len(starts))
+        target = np.tile(np.eye(4), (len(at), 1, 1))
+        target[:, :3, 3] = places[at]
+        weights = np.array([1, 1, 1, *(3 * (1 / self.chain.length,))])[list(rows)]
+
+        def lack(x: Array, samples: Array) -> tuple[Array, Array]:
+            r, J = residual(self.chain, x, target[samples])
+            return r[:, rows] * weights, J[:, rows] * weights[:, None]
+
+        x0 = np.tile(starts, (len(places), 1))
+        result = bounded_least_squares(lack, x0, self.low, self.high, ARRIVED / 10)
+        good = np.flatnonzero(result.residual < ARRIVED)
+        if not len(good):
+            return None
+        first = int(at[good].min())
+        ends = [result.x[k] for k in good if at[k] == first]
+        best = max(ends, key=lambda q: (self.knee(q) >= -1e-3, -round(float(np.abs(q - self.rest).sum()), 6)))
+        return _Solved(first, best, rows)
+
+    @cached_property
+    def starts(self) -> Array:
+        """Postures (k, n) near the resting one: hip, knee and ankle bent to either side."""
+        s = np.array([as_array(screw.s) for screw in self.chain.screws], dtype=float)
+        across = [i for i in range(len(s)) if abs(s[i, 1]) > 0.8 and self.chain.turning[i]]
+        starts = [self.rest]
+        for bend in (*BENDS, *(-b for b in BENDS)) if len(across) > 1 else ():
+            q = self.rest.copy()
+            q[across[0]] -= bend * np.sign(s[across[0], 1])
+            q[across[1]] += 2 * bend * np.sign(s[across[1], 1])
+            if len(across) > 2:
+                q[across[-1]] -= bend * np.sign(s[across[-1], 1])
+            starts.append(q)
+        return np.array(starts)
+
+    def knee(self, q: Array) -> float:
+        """How far the axis furthest from the line of first and last one is ahead of it, by the leg's size."""
+        D, points = IDENTITY, []
+        for screw, theta in zip(self.chain.screws, q, strict=True):
+            points.append(as_array(D @ screw.s0).astype(float))
+            D = D @ displacement(screw, float(theta))
+        hip, line = points[0], points[-1] - points[0]
+        along = [(p - hip) @ line / max(line @ line, 1e-12) for p in points]
+        return max((float((p - hip - t * line)[0]) for p, t in zip(points, along, strict=True)), key=abs) / (
+            self.chain.length
+        )
 
 
-def _starts(chain: SerialChain, rest: Array) -> Array:
-    """Postures (k, n) near the resting one, its axes across bent to either side: hip, knee, ankle."""
-    s = np.array([as_array(screw.s) for screw in chain.screws], dtype=float)
-    across = [i for i in range(len(s)) if abs(s[i, 1]) > 0.8 and chain.turning[i]]
-    starts = [rest]
-    if len(across) > 1:
-        knee = across[1]
-        for bend in BENDS:
-            for sense in (1.0, -1.0):
-                q = rest.copy()
-                for i, share in zip((across[0], knee, across[-1]), (-1.0, 2.0, -1.0), strict=True):
-                    if i != knee or share > 0:
-                        q[i] += sense * bend * share * np.sign(s[i, 1])
-                starts.append(q)
-    return np.array(starts)
-
-
-def _knee(chain: SerialChain, q: Array) -> float:
-    """How far the axis furthest from the line between first axis and last lies ahead of it [m]."""
-    D, points = IDENTITY, []
-    for screw, theta in zip(chain.screws, q, strict=True):
-        points.append(as_array(D @ screw.s0).astype(float))
-        D = D @ displacement(screw, float(theta))
-    hip, ankle = points[0], points[-1]
-    line = ankle - hip
-    share = [(p - hip) @ line / max(line @ line, 1e-12) for p in points]
-    ahead = [float((p - hip - t * line)[0]) for p, t in zip(points, share, strict=True)]
-    return max(ahead, key=abs)
-
-
-def _both(
-    legs: Legs, chain: SerialChain, rest: Array, q: Array, place: Array, rows: tuple[int, ...]
-) -> Array:
+def _both(legs: Legs, rest: Array, q: Array, place: Array, rows: tuple[int, ...]) -> Array:
     """All joints (n,), the right leg in the image of the left one's posture."""
+    left, right = (_Side.of(legs, limb, rest) for limb in ("left_leg", "right_leg"))
     whole = rest.copy()
-    whole[list(chain.joints)] = q
-    right = SerialChain.of(legs.robot, "right_leg")
-    low, high = _inner(right, rest[list(right.joints)], legs.shared)
-    start = rest[list(right.joints)].copy()
+    whole[left.own] = q
+    whole[right.own], starts = right.rest, right.starts
     if legs.image is not None:
-        start[-len(legs.image) :] = legs.image * q[-len(legs.image) :]
-    target = np.eye(4)[None].copy()
-    target[0, :3, 3] = place * (1, -1, 1)
-    target[0, 1, 3] = float(right.tip.p.y)
-    weights = np.array([1, 1, 1, *(3 * (1 / right.length,))])[list(rows)]
-
-    def lack(x: Array, samples: Array) -> tuple[Array, Array]:
-        r, J = residual(right, x, target[samples])
-        return r[:, rows] * weights, J[:, rows] * weights[:, None]
-
-    result = bounded_least_squares(lack, start[None], low, high, ARRIVED / 10)
-    whole[list(right.joints)] = result.x[0]
+        whole[right.own[legs.shared :]] = legs.image * q[legs.shared :]
+        starts = whole[right.own][None]
+    there = np.array([place[0], float(right.chain.tip.p.y), place[2]])
+    found = right.solved(there[None], rows, starts)
+    whole[right.own] = whole[right.own] if found is None else found.q
     return whole

@@ -11,9 +11,9 @@ from screwkin.model.toml_out import robot_toml
 
 WIDTH = 108
 HEAD = (
-    "Limbs, soles and the posture home were read off the robot's geometry, without regard to names, each"
-    " with a confidence from 0 to 1. Look them over, correct what is wrong, then take these comments out. Units are"
-    " m, kg, rad, s, N m; x points forward, y to the left, z up."
+    "Limbs, soles and the posture home were read off the robot's geometry, without regard to names, each with"
+    " a confidence from 0 to 1. Look them over, correct what is wrong, then take these comments out."
+    " Units are m, kg, rad, s, N m; x points forward, y to the left, z up."
 )
 
 
