@@ -30,11 +30,13 @@ class Mesh:
     Attributes:
         vertices: (V, 3).
         faces: (F, 3) indices of vertices.
+        colours: (F, 3) red, green, blue in [0, 1]; NaN where the file says none.
         turn: (3, 3) from the file's axes to z up: unity but for COLLADA that says otherwise.
     """
 
     vertices: Array
     faces: NDArray[np.int64]
+    colours: Array
     turn: Array
 
     @cached_property
@@ -51,6 +53,13 @@ class Mesh:
     def is_upright(self) -> bool:
         """Whether z is up in the file, or nothing is said of it."""
         return bool((self.turn == np.eye(3)).all())
+
+
+def hull_faces(points: Array) -> NDArray[np.int64]:
+    """Triangles (F, 3), as indices of points (N, 3), of the convex hull of points that lie in no plane."""
+    from scipy.spatial import ConvexHull
+
+    return np.asarray(ConvexHull(points).simplices, dtype=np.int64)
 
 
 def load_mesh(file: str | Path) -> Mesh:
@@ -78,8 +87,8 @@ def _read(file: str, changed: int, size: int) -> Mesh:
             import collada  # noqa: F401
     try:
         data = read_file(file)
-        whole: Any = trimesh.load_scene(BytesIO(data), file_type=kind, process=False).to_mesh()
-        vertices, faces = np.array(whole.vertices, dtype=float), np.array(whole.faces, dtype=np.int64)
+        scene: Any = trimesh.load_scene(BytesIO(data), file_type=kind, process=False)
+        vertices, faces, colours = _parts_of(scene)
     except MissingDependencyError:
         raise
     except Exception as wrong:  # damaged files raise whatever their reader stumbles over
@@ -90,9 +99,37 @@ def _read(file: str, changed: int, size: int) -> Mesh:
     if kind == "dae":
         unit, up = _asset(data)
         vertices, turn = vertices * unit, _UPRIGHT[up]
-    for array in (vertices, faces):
+    for array in (vertices, faces, colours):
         array.flags.writeable = False
-    return Mesh(vertices, faces, turn)
+    return Mesh(vertices, faces, colours, turn)
+
+
+def _parts_of(scene: Any) -> tuple[Array, NDArray[np.int64], Array]:
+    """Vertices, faces and colours of all parts of a scene, each in its place."""
+    vertices, faces, colours, count = (
+        [np.zeros((0, 3))],
+        [np.zeros((0, 3), dtype=np.int64)],
+        [np.zeros((0, 3))],
+        0,
+    )
+    for node in scene.graph.nodes_geometry:
+        T, name = scene.graph[node]
+        part = scene.geometry[name]
+        if not hasattr(part, "faces"):
+            continue
+        vertices.append(part.vertices @ T[:3, :3].T + T[:3, 3])
+        faces.append(part.faces + count)
+        colours.append(np.broadcast_to(_colour_of(part), (len(part.faces), 3)))
+        count += len(part.vertices)
+    return np.concatenate(vertices), np.concatenate(faces), np.concatenate(colours)
+
+
+def _colour_of(part: Any) -> Array:
+    """Red, green and blue of a part's material; NaN where its file says none."""
+    material = getattr(part.visual, "material", None)
+    if material is None:
+        return np.full(3, np.nan)
+    return np.array(material.main_color[:3], dtype=float) / 255
 
 
 def _asset(data: bytes) -> tuple[float, str]:

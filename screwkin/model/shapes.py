@@ -7,12 +7,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, leaves
 from screwkin.errors import InputError, MissingDependencyError
-from screwkin.model.meshes import load_mesh
+from screwkin.model.meshes import hull_faces, load_mesh
 from screwkin.model.records import Box, Link, RobotRecord, Shape, ShapeRole
+
+Faces = NDArray[np.int64]
 
 _SIGNS = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], dtype=float)
 _STEP = math.radians(15)  # between points of round faces: their chords are 0.9 % of a radius inside
@@ -33,6 +36,56 @@ def shape_points(shape: Shape, upright: bool = True) -> Array:
     """
     T = as_array(shape.pose)
     return _own_points(shape, upright) @ T[:3, :3].T + T[:3, 3]
+
+
+def shape_triangles(shape: Shape, upright: bool = True, cell: float = 0.0) -> tuple[Array, Array]:
+    """Corners (F, 3, 3) [m] of a shape's triangles in base axes, and their colours (F, 3), NaN if unknown.
+
+    Args:
+        shape: of numbers.
+        upright: as of ``shape_points``.
+        cell: edge of the cubes [m] within each of which vertices of a mesh become one; 0 for all of them.
+
+    Raises:
+        InputError: its mesh cannot be read.
+        MissingDependencyError: trimesh is absent.
+    """
+    if shape.kind == "mesh":
+        mesh = load_mesh(shape.file)
+        size = np.array(shape.size, dtype=float)
+        own = (mesh.vertices @ mesh.turn.T if upright else mesh.vertices) * size
+        faces, kept = _coarse(own, mesh.faces, cell)
+        colours = mesh.colours[kept]
+    else:
+        own = _own_points(shape, upright)
+        faces = hull_faces(own)
+        colours = np.full(faces.shape, np.nan)
+    if shape.colour:
+        colours = np.broadcast_to(shape.colour, faces.shape)
+    T = as_array(shape.pose)
+    return (own @ T[:3, :3].T + T[:3, 3])[faces], colours
+
+
+def _coarse(points: Array, faces: Faces, cell: float) -> tuple[Faces, Faces]:
+    """Faces between one vertex of every cube that holds any, each once, and which faces they were.
+
+    Faces of which two corners lie in one cube are left out.
+    """
+    if cell <= 0:
+        return faces, np.arange(len(faces))
+    cubes = np.floor(points / cell).astype(np.int64)
+    _, first, cube = np.unique(_keys(cubes - cubes.min(axis=0)), return_index=True, return_inverse=True)
+    merged = cube[faces]
+    ordered = np.sort(merged, axis=1)
+    whole = np.flatnonzero((np.diff(ordered) > 0).all(axis=1))
+    _, once = np.unique(_keys(ordered[whole]), return_index=True)
+    return first[merged[whole[once]]], whole[once]
+
+
+def _keys(rows: Faces) -> Faces:
+    """One number for each row of three that are not negative."""
+    most = rows.max(axis=0, initial=0) + 1
+    return np.asarray((rows[:, 0] * most[1] + rows[:, 1]) * most[2] + rows[:, 2])
 
 
 def box_points(box: Box) -> Array:

@@ -94,8 +94,8 @@ def shape_reader(reader: Reader, root: Element, folder: Path) -> ShapeReader:
 
 
 def _rgb(material: Element) -> tuple[float, ...]:
-    """Red, green and blue of a material, with or without its alpha; none where it has no colour."""
-    colour = material.find("color")
+    """Red, green and blue of a material; none where it has a texture or no colour."""
+    colour = None if material.find("texture") is not None else material.find("color")
     text = "" if colour is None else colour.get("rgba", "")
     return tuple(min(1.0, max(0.0, number)) for number in _numbers(" ".join(text.split()[:3]), 3))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from screwkin.analysis.account import Account
 from screwkin.dynamics.support import convex_hull
 from screwkin.kinematics.positions import link_displacements
 from screwkin.model.robot import Robot
+from screwkin.model.shapes import box_points, link_points
 from screwkin.report.style import Axes, Figure, joint_colours, new_figure
 from screwkin.sim.camera import Camera
 from screwkin.sim.render import pictures
@@ -47,15 +48,16 @@ def frames_of_run(account: Account, run: Run) -> Figure:
 
 
 def frames_drawn(account: Account) -> Figure:
-    """Frames of the planned walk from the robot's right, drawn from the boxes of its table."""
+    """Frames of the planned walk from the robot's right, drawn from the shapes or boxes of its table."""
     trajectory, robot = account.trajectory, account.robot
     figure, axes = new_figure(5.4, ROWS, COLUMNS, squeeze=False, sharey=True)
     samples = [int(np.abs(trajectory.time - time).argmin()) for time in frame_times(account)]
-    outlines = [_outlines(robot, trajectory.T_world_base[i], trajectory.q[i]) for i in samples]
+    solids = _solids(robot)
+    outlines = [_outlines(robot, solids, trajectory.T_world_base[i], trajectory.q[i]) for i in samples]
     reach = max(np.abs(outline[:, 0]).max() for frame in outlines for _, _, outline in frame)
     top = max(outline[:, 1].max() for frame in outlines for _, _, outline in frame)
     of_joint = joint_colours(account, GREY)
-    colours = {robot.base_link: GREY} | {j.child: of_joint[j.name] for j in robot.joints}
+    colours = {robot.base_link: GREY} | {j.child: of_joint.get(j.name, GREY) for j in robot.tree}
     for one, i, frame in zip(axes.flat, samples, outlines, strict=True):
         _draw(one, frame, colours)
         one.set_xlim(-1.1 * reach, 1.1 * reach)
@@ -76,10 +78,12 @@ def _draw(axes: Axes, frame: Sequence[tuple[str, float, Array]], colours: dict[s
             axes.plot(*outline.T, color=colour, linewidth=2.5, solid_capstyle="round")
 
 
-def _outlines(robot: Robot, T_world_base: Array, q: Array) -> list[tuple[str, float, Array]]:
-    """Link, distance from the viewer and outline (k, 2) [m] of every box, seen from the right of the waist.
+def _outlines(
+    robot: Robot, solids: Mapping[str, Sequence[Array]], T_world_base: Array, q: Array
+) -> list[tuple[str, float, Array]]:
+    """Link, distance from the viewer and outline (k, 2) [m] of every solid, seen from the right of the waist.
 
-    A link without a box is the line from its joint to the joints and tips that it carries.
+    A link without any is the line from its joint to the joints and tips that it carries.
     """
     T = pose_from_array(T_world_base)
     poses = [T @ D for D in link_displacements(robot, unstack(q))]
@@ -90,22 +94,30 @@ def _outlines(robot: Robot, T_world_base: Array, q: Array) -> list[tuple[str, fl
     sides = []
     for link, pose in zip(robot.links, poses, strict=True):
         D = as_array(pose)
-        for points in _solids(robot, link.name):
+        for points in solids[link.name]:
             seen = (points @ D[:3, :3].T + D[:3, 3] - origin) @ view.T
-            flat = convex_hull(seen[:, :2]) if len(points) == 8 else seen[:, :2]
+            flat = convex_hull(seen[:, :2]) if len(points) > 2 else seen[:, :2]
             sides.append((link.name, float(seen[:, 2].mean()), flat))
     return sides
 
 
-def _solids(robot: Robot, name: str) -> list[Array]:
-    """Corners (8, 3) of a link's boxes; without boxes the ends (2, 3) of the lines to its joints."""
-    boxes = robot.link(name).boxes
-    if boxes:
-        signs = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, -1).T
-        return [as_array(box.center) + signs * as_array(box.size) for box in boxes]
+def _solids(robot: Robot) -> dict[str, list[Array]]:
+    """Of every link the points (N, 3) of its shapes, else of each of its boxes, else of each of its lines."""
+    shaped = link_points(robot, "visual").points
+    solids = {}
+    for link in robot.links:
+        if link.shapes and link.name in shaped:
+            solids[link.name] = [shaped[link.name]]
+        else:
+            solids[link.name] = [box_points(box) for box in link.boxes] or _lines(robot, link.name)
+    return solids
+
+
+def _lines(robot: Robot, name: str) -> list[Array]:
+    """Ends (2, 3) of the lines from a link's joint to the joints and tips that it carries."""
     if name not in robot.joint_above:
         return []
-    start = as_array(robot.joints[robot.joint_above[name]].screw.s0)
-    ends = [as_array(joint.screw.s0) for joint in robot.joints if joint.parent == name]
+    start = as_array(robot.tree[robot.joint_above[name]].screw.s0)
+    ends = [as_array(joint.screw.s0) for joint in robot.tree if joint.parent == name]
     ends += [as_array(limb.frame.p) for limb in robot.limbs if limb.link == name]
     return [np.stack([start, end]) for end in ends if np.linalg.norm(end - start) > 1e-6]

@@ -1,21 +1,25 @@
-"""Pictures of a robot of boxes on a tiled floor, drawn by NumPy and Pillow alone.
+"""Pictures of a robot on a tiled floor, drawn by NumPy and Pillow alone.
 
 No display, no graphics card, no simulator: the same function draws what a simulator saw and what a trajectory
-plans. Faces are filled front to back by depth, the shadow is the boxes' outline carried along the light onto
-the floor, and everything is drawn at twice the size and then reduced, which smooths the edges.
+plans. Faces are filled front to back by depth, the shadow is every face carried along the light onto the
+floor, and everything is drawn at twice the size and then reduced, which smooths the edges.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
-from screwkin.algebra.se3 import IDENTITY, Vector, as_array, unstack
+from screwkin.algebra.se3 import IDENTITY, as_array, unstack
+from screwkin.dynamics.support import convex_hull
 from screwkin.kinematics.positions import link_displacements
 from screwkin.model.robot import Robot
-from screwkin.model.urdf import link_colours
 from screwkin.sim.camera import Camera, Picture, View, following, view_of
+from screwkin.sim.solids import Part, Solids, solids_of
+from screwkin.sim.triangles import draw_triangles
 
 FINER = 2
 """How many times larger pictures are drawn than they become."""
@@ -26,60 +30,69 @@ SHADE = 0.30
 REACH = 12.0
 """How far the floor is drawn, in distances of the camera; it fades into the sky on the way."""
 
-_SIGNS = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], dtype=float)
+_CELL = 1 / 200  # of the camera's distance: what meshes are coarsened to, two pixels
 _FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 
 
 def pictures(robot: Robot, time: Array, T_world_base: Array, q: Array, camera: Camera) -> list[Picture]:
     """Pictures (height, width, 3) of K states, the camera gliding along.
 
+    Links show their shapes; without any that can be read their boxes, and without these nothing.
+
     Args:
-        robot: links with boxes; others are not seen.
+        robot: of numbers.
         time: (K,) [s], increasing.
         T_world_base: (K, 4, 4).
         q: (K, n).
         camera: see ``Camera``.
     """
-    corners, colours = _boxes(robot, T_world_base, q)
+    carried = link_displacements(robot, unstack(np.asarray(q, dtype=float)))
+    displacements = T_world_base[:, None] @ np.moveaxis(as_array([D @ IDENTITY for D in carried]), -3, -3)
     targets = following(time, T_world_base)
     away = camera.distance * float(T_world_base[0, 2, 3])
+    solids = solids_of(robot, _CELL * away)
     return [
-        _picture(camera, target, away, boxes, colours) for target, boxes in zip(targets, corners, strict=True)
+        _picture(camera, target, away, solids, Ts) for target, Ts in zip(targets, displacements, strict=True)
     ]
 
 
-def _boxes(robot: Robot, T_world_base: Array, q: Array) -> tuple[Array, Array]:
-    """Corners (K, boxes, 8, 3) in the world, and colours (boxes, 3) [0, 1]."""
-    carried = link_displacements(robot, unstack(np.asarray(q, dtype=float)))
-    displacements = as_array([D @ IDENTITY for D in carried])
-    paint = link_colours(robot)
-    corners, colours = [], []
-    for i, link in enumerate(robot.links):
-        T = T_world_base @ displacements[..., i, :, :]
-        for box in link.boxes:
-            local = _numbers(box.center) + 0.5 * _SIGNS * _numbers(box.size)
-            corners.append(local @ T[:, :3, :3].transpose(0, 2, 1) + T[:, None, :3, 3])
-            colours.append(paint[link.name][:3])
-    if not corners:
-        return np.zeros((len(q), 0, 8, 3)), np.zeros((0, 3))
-    return np.stack(corners, axis=1), np.array(colours)
-
-
-def _numbers(v: Vector) -> Array:
-    return np.array([float(component) for component in v])
-
-
-def _picture(camera: Camera, target: Array, away: float, boxes: Array, colours: Array) -> Picture:
+def _picture(camera: Camera, target: Array, away: float, solids: Solids, Ts_world_link: Array) -> Picture:
     from PIL import Image
 
     view = view_of(camera, target, away, FINER)
-    canvas = _floor(camera, view, target, away, boxes)
+    boxes, triangles = (_placed(part, Ts_world_link) for part in (solids.boxes, solids.triangles))
+    outlines = [*boxes[:, _FACES].reshape(-1, 4, 3), *_hulls(triangles, solids.triangles.links, camera)]
+    canvas = _floor(camera, view, target, away, outlines)
     light = np.array(camera.light) / np.linalg.norm(camera.light)
     nearness = np.zeros(canvas.shape[:2])
-    for corners, colour in zip(boxes, colours, strict=True):
+    for corners, colour in zip(boxes, solids.boxes.colours, strict=True):
         _draw_box(canvas, nearness, view, corners, colour, light, camera.ambient)
+    shades = solids.triangles.colours * _lit(triangles, view.eye, light, camera.ambient)[:, None]
+    draw_triangles(canvas, nearness, view, triangles, shades)
     image = Image.fromarray(np.rint(255 * np.clip(canvas, 0.0, 1.0)).astype(np.uint8))
     return np.asarray(image.resize((camera.width, camera.height), Image.Resampling.BOX))
+
+
+def _placed(part: Part, Ts_world_link: Array) -> Array:
+    """The corners of a part's pieces in the world."""
+    T = Ts_world_link[part.links]
+    return part.corners @ T[:, :3, :3].transpose(0, 2, 1) + T[:, None, :3, 3]
+
+
+def _hulls(triangles: Array, links: NDArray[np.int64], camera: Camera) -> list[Array]:
+    """Corners (k, 3) on the floor of the hull of every link's shadow."""
+    cast = triangles - triangles[..., 2:] / camera.light[2] * np.array(camera.light)
+    hulls = [convex_hull(cast[links == link, :, :2].reshape(-1, 2)) for link in np.unique(links)]
+    return [np.column_stack([hull, np.zeros(len(hull))]) for hull in hulls]
+
+
+def _lit(triangles: Array, eye: Array, light: Array, ambient: float) -> Array:
+    """Brightness (F,) of triangles, whichever of their sides is seen."""
+    a, b, c = np.moveaxis(triangles, 1, 0)
+    normals = np.cross(b - a, c - a)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1), 1e-30)[:, None]
+    towards = np.sign(np.einsum("fi,fi->f", normals, eye - a))
+    return np.asarray(ambient + (1.0 - ambient) * np.clip(LAMP * towards * (normals @ light), 0.0, 1.0))
 
 
 def _draw_box(
@@ -122,8 +135,10 @@ def _inside(polygon: Array, x: Array, y: Array) -> NDArray[np.bool_]:
     return np.asarray((np.min(side, axis=0) >= 0.0) | (np.max(side, axis=0) <= 0.0))
 
 
-def _floor(camera: Camera, view: View, target: Array, away: float, boxes: Array) -> NDArray[np.float32]:
-    """Sky and floor with the boxes' shadow, (height, width, 3) in [0, 1].
+def _floor(
+    camera: Camera, view: View, target: Array, away: float, outlines: Sequence[Array]
+) -> NDArray[np.float32]:
+    """Sky and floor with the robot's shadow, (height, width, 3) in [0, 1].
 
     The camera does not roll, so all rays of a row meet the floor on one line: what depends on the row alone
     is computed once per row.
@@ -143,22 +158,20 @@ def _floor(camera: Camera, view: View, target: Array, away: float, boxes: Array)
     floor = np.where(
         (parity & 1)[..., None], odd[:, None].astype(np.float32), even[:, None].astype(np.float32)
     )
-    floor *= (1.0 - SHADE * _shadow(camera, view, boxes))[..., None]
+    floor *= (1.0 - SHADE * _shadow(camera, view, outlines))[..., None]
     return floor
 
 
-def _shadow(camera: Camera, view: View, boxes: Array) -> NDArray[np.float32]:
-    """Share (height, width) of the lamp's light that the boxes block, softened at the shadow's edge."""
+def _shadow(camera: Camera, view: View, outlines: Sequence[Array]) -> NDArray[np.float32]:
+    """Share (height, width) of the lamp's light that polygons (k, 3) block, softened at the shadow's edge."""
     from PIL import Image, ImageDraw, ImageFilter
 
     mask = Image.new("L", (view.width, view.height))
     draw = ImageDraw.Draw(mask)
     light = np.array(camera.light)
-    fallen = boxes - boxes[..., 2:] / light[2] * light
-    pixels, depth = view.project(fallen)
-    for corners, far in zip(pixels, depth, strict=True):
-        for face in _FACES:
-            if far[list(face)].min() > 0.0:
-                draw.polygon([tuple(corner) for corner in corners[list(face)].tolist()], fill=255)
+    for corners in outlines:
+        pixels, depth = view.project(corners - corners[:, 2:] / light[2] * light)
+        if depth.min() > 0.0:
+            draw.polygon(pixels.ravel().tolist(), fill=255)
     soft = mask.filter(ImageFilter.GaussianBlur(1.5 * FINER))
     return np.asarray(soft, dtype=np.float32) / 255.0

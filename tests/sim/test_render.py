@@ -10,12 +10,16 @@ import pytest
 from PIL import Image
 
 import screwkin as sk
-from screwkin.algebra.se3 import Vector
-from screwkin.errors import OutputError
+from screwkin.algebra.se3 import UNTURNED, Pose, Vector
+from screwkin.errors import OutputError, RobotRemark
+from screwkin.model.meshes import hull_faces
+from screwkin.model.records import Shape
 from screwkin.model.robot import Box, Link, Robot
+from screwkin.model.shapes import box_points
 from screwkin.model.urdf import ORANGE, SLATE, WHITE
 from screwkin.sim.camera import Camera, Picture, following, save_gif, save_png, view_of
 from screwkin.sim.render import pictures
+from screwkin.sim.triangles import draw_triangles
 
 SMALL = Camera(width=160, height=120)
 
@@ -103,6 +107,56 @@ def test_a_box_hides_what_stands_behind_it_and_the_first_of_two_equal_faces_is_s
     assert near(one_picture(scene(wide, ahead)), SLATE).sum() > 50
     assert near(one_picture(scene(wide, behind)), SLATE).sum() == near(plain, SLATE).sum()
     assert np.array_equal(one_picture(scene(wide, wide)), plain)
+
+
+def test_a_shape_looks_like_the_box_of_its_size_and_a_mesh_like_the_same_shape(
+    robot: Robot, tmp_path: Path
+) -> None:
+    """The two ways of drawing, faces one by one and triangles all at once, against each other."""
+
+    def scene(**seen: object) -> Picture:
+        links = [replace(link, boxes=()) for link in robot.links[1:]]
+        trunk = replace(robot.links[0], **{"boxes": (), **seen})
+        return one_picture(replace(robot, links=(trunk, *links)))
+
+    box = Box(Vector(0, 0.02, 0), Vector(0.2, 0.1, 0.15))
+    boxed = scene(boxes=(box,)).astype(int)
+    shape = Shape("visual", "box", Pose(UNTURNED, box.center), tuple(box.size), "", WHITE[:3])
+    shaped = scene(shapes=(shape,)).astype(int)
+    assert (np.abs(boxed - shaped).max(axis=-1) > 3).mean() < 0.01
+    corners = box_points(Box(Vector(0, 0, 0), Vector(1, 1, 1)))
+    faces = "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in hull_faces(corners))
+    path = tmp_path / "cube.obj"
+    path.write_text("".join(f"v {x} {y} {z}\n" for x, y, z in corners) + faces)
+    mesh = replace(shape, kind="mesh", file=str(path))
+    np.testing.assert_array_equal(scene(shapes=(mesh,)), shaped)
+    red = scene(boxes=(box,), shapes=(replace(shape, colour=(1.0, 0.0, 0.0)),))
+    assert near(red, (1.0, 0.0, 0.0)).sum() > 500
+    with pytest.warns(RobotRemark, match=r"not in pictures: mesh .*none\.obj: cannot be read"):
+        missing = scene(boxes=(box,), shapes=(replace(mesh, file=str(tmp_path / "none.obj")),))
+    np.testing.assert_array_equal(missing, boxed)
+
+
+def test_the_nearest_of_many_triangles_is_seen_wherever_rays_meet_several() -> None:
+    """Against rays cast through the centres of all pixels, one triangle at a time."""
+    rng = np.random.default_rng(5)
+    corners = rng.uniform(-0.5, 0.5, (40, 1, 3)) + rng.uniform(-0.3, 0.3, (40, 3, 3))
+    shades = rng.uniform(0.1, 1, (40, 3))
+    view = view_of(replace(SMALL, width=60, height=50), np.zeros(3), 2.0)
+    canvas, nearness = np.zeros((50, 60, 3), dtype=np.float32), np.zeros((50, 60))
+    draw_triangles(canvas, nearness, view, corners, shades)
+    x, y = np.meshgrid(np.arange(60) + 0.5, np.arange(50) + 0.5)
+    right, up, forward = view.axes
+    rays = forward + ((x - 30) / view.focal)[..., None] * right - ((y - 25) / view.focal)[..., None] * up
+    nearest, wanted = np.full(x.shape, np.inf), np.zeros_like(canvas)
+    for triangle, shade in zip(corners, shades, strict=True):
+        a, edges = triangle[0], np.column_stack([triangle[1] - triangle[0], triangle[2] - triangle[0]])
+        columns = np.concatenate([np.broadcast_to(edges, (*x.shape, 3, 2)), -rays[..., None]], axis=-1)
+        u, v, t = np.moveaxis(np.linalg.solve(columns, (view.eye - a)[:, None])[..., 0], -1, 0)
+        hit = (np.minimum(np.minimum(u, v), 1 - u - v) >= 0) & (t > 0) & (t < nearest)
+        nearest[hit], wanted[hit] = t[hit], shade
+    assert (np.abs(canvas - wanted).max(axis=-1) > 1e-6).mean() < 0.002
+    assert (wanted.max(axis=-1) > 0).mean() > 0.2
 
 
 def test_the_shadow_lies_on_the_side_away_from_the_lamp(robot: Robot) -> None:

@@ -1,0 +1,90 @@
+"""What pictures show of a robot: the triangles of its shapes, and the boxes of links without any."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from screwkin.algebra.arrays import Array
+from screwkin.errors import InputError, MissingDependencyError, RobotRemark
+from screwkin.model.records import Link
+from screwkin.model.robot import Robot
+from screwkin.model.shapes import box_points, honours_up, shape_triangles
+from screwkin.model.urdf import link_colours
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """Pieces of one kind.
+
+    Attributes:
+        links: (F,) index of the link that carries each.
+        corners: (F, 8 or 3, 3) [m] in the zero pose, in base axes.
+        colours: (F, 3) in [0, 1].
+    """
+
+    links: NDArray[np.int64]
+    corners: Array
+    colours: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Solids:
+    """All that is seen of a robot."""
+
+    boxes: Part
+    triangles: Part
+
+
+def solids_of(robot: Robot, cell: float) -> Solids:
+    """Shapes for pictures, else those of collision, else boxes, for every link.
+
+    What cannot be read is a warning (``RobotRemark``), one for all of it.
+
+    Args:
+        robot: of numbers.
+        cell: edge of the cubes [m] that meshes are coarsened to.
+    """
+    paint, upright, unread = link_colours(robot), honours_up(robot), dict[str, None]()
+    boxes: list[tuple[int, Array, Array]] = []
+    triangles: list[tuple[int, Array, Array]] = []
+    for i, link in enumerate(robot.links):
+        own = np.array(paint[link.name][:3])
+        shown = _triangles(link, upright, cell, unread)
+        for corners, colours in shown:
+            triangles.append((i, corners, np.where(np.isnan(colours), own, colours)))
+        for box in () if shown else link.boxes:
+            boxes.append((i, box_points(box)[None], own[None]))
+    if unread:
+        first, *others = unread
+        more = f", and {len(others)} more files" if others else ""
+        warnings.warn(f"{robot.name}: not in pictures: {first}{more}", RobotRemark, stacklevel=3)
+    return Solids(_part(boxes, 8), _part(triangles, 3))
+
+
+def _triangles(link: Link, upright: bool, cell: float, unread: dict[str, None]) -> list[tuple[Array, Array]]:
+    for role in ("visual", "collision"):
+        shown = []
+        for shape in link.shapes:
+            if shape.role == role:
+                try:
+                    shown.append(shape_triangles(shape, upright, cell))
+                except (InputError, MissingDependencyError) as wrong:
+                    unread[str(wrong)] = None
+        if shown:
+            return shown
+    return []
+
+
+def _part(pieces: list[tuple[int, Array, Array]], count: int) -> Part:
+    """Pieces of so many corners as one part."""
+    links = [np.full(len(corners), link) for link, corners, _ in pieces]
+    none = np.zeros((0, 3))
+    return Part(
+        np.concatenate([np.zeros(0, dtype=np.int64), *links]),
+        np.concatenate([np.zeros((0, count, 3)), *(corners for _, corners, _ in pieces)]),
+        np.concatenate([none, *(colours for _, _, colours in pieces)]),
+    )
