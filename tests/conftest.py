@@ -1,10 +1,11 @@
-"""Set-up shared by all tests: one thread per process, no display, repeatable examples, double precision."""
+"""Set-up shared by all tests: one thread per process, no display, repeatable examples, robots read once."""
 
 from __future__ import annotations
 
 import os
 import tempfile
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy is loaded: pytest-xdist has the cores
@@ -14,6 +15,11 @@ os.environ.setdefault("SCREWKIN_CACHE", str(Path(tempfile.gettempdir()) / f"scre
 
 import pytest
 from hypothesis import HealthCheck, settings
+
+from screwkin.model import table
+
+table.parse_robot = cache(table.parse_robot)
+"""One robot a text in every process: its programs are recorded once, not anew in every test that loads it."""
 
 settings.register_profile("dev", deadline=None, print_blob=True)
 settings.register_profile(
