@@ -21,10 +21,19 @@ from screwkin.model import table
 table.parse_robot = cache(table.parse_robot)
 """One robot a text in every process: its programs are recorded once, not anew in every test that loads it."""
 
-settings.register_profile("dev", deadline=None, print_blob=True)
+FEW = 40
+"""Random examples of a law, where its test does not say how many; HYPOTHESIS_PROFILE=many draws 2,000."""
+
+settings.register_profile("dev", deadline=None, print_blob=True, max_examples=FEW)
 settings.register_profile(
-    "ci", deadline=None, print_blob=True, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+    "ci",
+    deadline=None,
+    print_blob=True,
+    max_examples=FEW,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.too_slow],
 )
+settings.register_profile("many", deadline=None, print_blob=True, max_examples=2000)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci" if os.environ.get("CI") else "dev"))
 
 
