@@ -14,6 +14,9 @@ Array = np.ndarray[Any, np.dtype[Any]]
 Integers = np.ndarray[Any, np.dtype[np.int64]]
 """An array of integers."""
 
+Booleans = np.ndarray[Any, np.dtype[np.bool_]]
+"""An array of truth values."""
+
 
 def numpy_of(*arrays: object) -> Any:
     """The module that computes with such arrays: ``jax.numpy`` if one is a JAX array, else ``numpy``."""

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from screwkin.algebra.arrays import Integers
+from screwkin.algebra.arrays import Booleans, Integers
 
 
-def components(pattern: Sequence[Sequence[bool]] | Integers) -> list[tuple[list[int], list[int]]]:
+def components(pattern: Sequence[Sequence[bool]] | Integers | Booleans) -> list[tuple[list[int], list[int]]]:
     """Blocks (rows, columns) into which a matrix with this pattern of nonzeros falls apart.
 
     Columns without an entry belong to no block.

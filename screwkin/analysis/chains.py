@@ -49,7 +49,7 @@ def chains_of(robot: Robot) -> tuple[ModelChain, ...]:
     chains = []
     for name, tip, link, frame in _ends(robot):
         joints = robot.path_to(link)
-        screws, names = tuple(robot.joints[i].screw for i in joints), [robot.joint_names[i] for i in joints]
+        screws, names = tuple(robot.tree[i].screw for i in joints), [robot.tree[i].name for i in joints]
         if name in printed and list(printed[name].joint_names) != names:
             raise InputError(
                 f"{_file(robot)}: chain {name!r} has the joints {', '.join(printed[name].joint_names)}, "
@@ -138,8 +138,8 @@ def _ends(robot: Robot) -> Iterator[tuple[str, str, str, Pose]]:
     if robot.limbs:
         yield from ((limb.name, limb.tip, limb.link, limb.frame) for limb in robot.limbs)
         return
-    parents = {joint.parent for joint in robot.joints}
-    for joint in robot.joints:
+    parents = {joint.parent for joint in robot.tree}
+    for joint in robot.tree:
         if joint.child not in parents:
             yield joint.child, joint.child, joint.child, robot.link(joint.child).frame
 

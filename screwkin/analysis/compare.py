@@ -25,7 +25,7 @@ from screwkin.compiler.run import run
 from screwkin.errors import InputError
 from screwkin.mechanism.scaling import characteristic_length
 from screwkin.model.dh import DHTable, dh_fk
-from screwkin.model.robot import Robot
+from screwkin.model.robot import Robot, refuse_coupled
 
 BATCH = 200
 """Joint positions per evaluation when times are measured: small enough for memory to play no part."""
@@ -110,6 +110,10 @@ def compare_models(robot: Robot, samples: int = 1000, rounds: int = 21, seed: in
     if samples < 1 or rounds < 1:
         raise InputError(f"samples {samples} and rounds {rounds} must be at least 1")
     chains = chains_of(robot)
+    for chain in chains:
+        refuse_coupled(
+            robot, chain.joints, "compare", "compare the robot with its coupled joints read as free"
+        )
     models = support_models(robot, chains)
     rng, length = np.random.default_rng(seed), characteristic_length(robot)
     q = random_positions(robot, samples, rng)

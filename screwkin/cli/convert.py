@@ -13,6 +13,7 @@ from screwkin.cli.options import AsJson
 from screwkin.cli.output import print_json, remark
 from screwkin.errors import InputError, one_of
 from screwkin.files import atomic_write
+from screwkin.model.coupled import coupling_text
 from screwkin.model.dh import CONVENTIONS, Convention
 from screwkin.model.dh_csv import dh_text, load_dh
 from screwkin.model.dh_robot import robot_from_dh
@@ -21,7 +22,7 @@ from screwkin.model.table import load_robot
 from screwkin.model.toml_out import robot_toml
 from screwkin.model.urdf import urdf_from_robot
 from screwkin.model.urdf_in import load_urdf
-from screwkin.model.urdf_xml import MIMICS, Mimic
+from screwkin.model.urdf_joints import MIMICS, Mimic
 
 _FRAMES = "URDF holds no limbs, postures and servos; tips and soles are frames fixed to their links"
 FORMATS = (".toml", ".urdf", ".csv")
@@ -43,9 +44,9 @@ def convert(
         str,
         typer.Option(
             metavar="HOW",
-            help="Coupled joints of a URDF to read: refuse them, or read them as free joints with a remark.",
+            help="Joints of a URDF that follow others: couple them, or read them as free joints.",
         ),
-    ] = "refuse",
+    ] = "couple",
     as_json: AsJson = False,
 ) -> int:
     """Convert a robot between screw tables (.toml), URDF (.urdf) and Denavit-Hartenberg tables (.csv).
@@ -99,4 +100,6 @@ def _written(robot: Robot, target: Path, convention: Convention) -> tuple[str, l
         ".urdf": [_FRAMES] if robot.limbs else [],
         ".csv": ["DH tables hold the chains' geometry only: no masses, limits, soles and closures"],
     }
+    if robot.coupled and suffix == ".csv":
+        lost[suffix].append(f"these joints are free in it: {', '.join(map(coupling_text, robot.coupled))}")
     return writers[suffix](), lost[suffix]

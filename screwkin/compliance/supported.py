@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from screwkin.algebra.scalar import Scalar
+from screwkin.algebra.scalar import Scalar, plus, times
 from screwkin.algebra.screws import Displacement, at
-from screwkin.algebra.se3 import ZERO, Pose, Twist, Vector, Z, cross, dot
-from screwkin.kinematics.mass import mass_center, mass_center_velocities
-from screwkin.kinematics.positions import joint_twists, link_displacements, pose_in_base
+from screwkin.algebra.se3 import NO_TWIST, ZERO, Pose, Twist, Vector, Z, cross, dot
+from screwkin.kinematics.mass import mass_center, subtree_velocities
+from screwkin.kinematics.positions import joint_twists, link_displacements, per_coordinate, pose_in_base
 from screwkin.model.robot import Robot
 
 
@@ -45,7 +45,7 @@ class Supported:
 
     @cached_property
     def stance(self) -> tuple[int, ...]:
-        """Joints between base and support, from the base on."""
+        """Indices in ``robot.tree`` of the joints between base and support, from the base on."""
         return self.robot.path_to(self.robot.frame(self.support)[0])
 
     def path(self, link: str) -> tuple[int, ...]:
@@ -66,17 +66,21 @@ class Supported:
         return self.base @ pose_in_base(self.robot, self.displacements, frame)
 
     def jacobian(self, frame: str) -> dict[int, Twist]:
-        """Joint index to the frame's twist per unit rate, at the frame's own origin; other joints: none."""
+        """Index in q to the frame's twist per unit rate, at the frame's own origin; other joints: none."""
         p = self.base.R @ pose_in_base(self.robot, self.displacements, frame).p
-        return {i: at(p, self.twists[i]) for i in self.path(self.robot.frame(frame)[0])}
+        columns: dict[int, Twist] = {}
+        for k in self.path(self.robot.frame(frame)[0]):
+            i, ratio = self.robot.gears[k]
+            columns[i] = columns.get(i, NO_TWIST) + at(p, self.twists[k]) * ratio
+        return columns
 
     @cached_property
     def mass_velocities(self) -> list[Vector]:
-        """Sum of mass times velocity over all links, per unit rate of each joint [kg m]."""
+        """Sum of mass times velocity over all links, per unit rate of each joint of ``robot.tree`` [kg m]."""
         turned = Pose(self.base.R, ZERO)
         D = [turned @ d for d in self.displacements]
         screws = joint_twists(self.robot, self.displacements, turned)
-        c, columns = mass_center(self.robot, D), mass_center_velocities(self.robot, D, screws)
+        c, columns = mass_center(self.robot, D), subtree_velocities(self.robot, D, screws)
         held = [
             column - at(c, screw).v if i in self.stance else column
             for i, (column, screw) in enumerate(zip(columns, screws, strict=True))
@@ -88,16 +92,22 @@ class Supported:
 
         It is the gradient of the potential energy: the power of all weights per unit rate of the joint.
         """
-        return [dot(self.up, v) * gravity for v in self.mass_velocities]
+        return [dot(self.up, v) * gravity for v in per_coordinate(self.robot, self.mass_velocities)]
 
     def gravity_stiffness(self, gravity: float) -> dict[tuple[int, int], Scalar]:
         """Derivatives of the gravity torques (i, j), i <= j: the Hessian of the potential energy, symmetric.
 
         A joint i between support and joint j turns all that j moves, and with it their velocities.
         """
-        hessian: dict[tuple[int, int], Scalar] = {}
-        for j, joint in enumerate(self.robot.joints):
+        tree: dict[tuple[int, int], Scalar] = {}
+        for j, joint in enumerate(self.robot.tree):
             for i in self.path(joint.parent if j in self.stance else joint.child):
                 rises = cross(self.up, self.twists[i].omega)  # up . (omega x v), with up x omega once for i
-                hessian[min(i, j), max(i, j)] = dot(rises, self.mass_velocities[j]) * gravity
+                tree[min(i, j), max(i, j)] = dot(rises, self.mass_velocities[j]) * gravity
+        hessian: dict[tuple[int, int], Scalar] = {}
+        for (a, b), value in tree.items():
+            (i, r), (j, s) = self.robot.gears[a], self.robot.gears[b]
+            share = times(times(value, r), times(s, 2 if i == j and a != b else 1))
+            at_pair = min(i, j), max(i, j)
+            hessian[at_pair] = plus(hessian[at_pair], share) if at_pair in hessian else share
         return hessian

@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from screwkin.algebra.scalar import Scalar
+from screwkin.algebra.scalar import Scalar, times
 from screwkin.algebra.screws import Wrench, at, power
 from screwkin.algebra.se3 import ZERO, Pose, Rotation, Twist, Vector, X, Y, Z, bracket, cross, dot
-from screwkin.kinematics.positions import joint_twists, link_displacements
+from screwkin.kinematics.positions import joint_twists, link_displacements, per_coordinate, tree_rates
 from screwkin.model.robot import Inertia, Robot
 
 GRAVITY = 9.81
@@ -48,9 +48,10 @@ def rotated(inertia: Inertia, R: Rotation) -> Inertia:
 def link_twists(bodies: Bodies, qd: Sequence[Scalar], base: Twist) -> dict[str, Twist]:
     """Twist of every link, at the base origin."""
     robot = bodies.robot
-    V = {robot.base_link: base}
+    V, rates = {robot.base_link: base}, tree_rates(robot, qd)
     for i in robot.traversal:
-        V[robot.joints[i].child] = V[robot.joints[i].parent] + bodies.twists[i] * qd[i]
+        joint = robot.tree[i]
+        V[joint.child] = V[joint.parent] + bodies.twists[i] * rates[i]
     return V
 
 
@@ -61,9 +62,10 @@ def link_accelerations(
     robot = bodies.robot
     v0 = V[robot.base_link]
     A = {robot.base_link: Twist(base.omega, base.v - cross(v0.omega, v0.v))}
+    rates, changes = tree_rates(robot, qd), tree_rates(robot, qdd)
     for i in robot.traversal:
-        joint, S = robot.joints[i], bodies.twists[i]
-        A[joint.child] = A[joint.parent] + S * qdd[i] + bracket(V[joint.parent], S) * qd[i]
+        joint, S = robot.tree[i], bodies.twists[i]
+        A[joint.child] = A[joint.parent] + S * changes[i] + bracket(V[joint.parent], S) * rates[i]
     return A
 
 
@@ -127,11 +129,10 @@ def wrench_and_efforts(
     robot = bodies.robot
     W = link_wrenches(bodies, qd, qdd, base, base_rate, gravity)
     for i in reversed(robot.traversal):
-        joint = robot.joints[i]
+        joint = robot.tree[i]
         W[joint.parent] = W[joint.parent] + W[joint.child]
-    return W[robot.base_link], [
-        power(W[j.child], S) for j, S in zip(robot.joints, bodies.twists, strict=True)
-    ]
+    efforts = [power(W[joint.child], S) for joint, S in zip(robot.tree, bodies.twists, strict=True)]
+    return W[robot.base_link], per_coordinate(robot, efforts)
 
 
 @dataclass(frozen=True)
@@ -154,7 +155,10 @@ class Composite:
 
 
 def composite_mass_matrix(bodies: Bodies) -> list[list[Scalar]]:
-    """Mass matrix for [base twist at the base origin; qd], by composite bodies."""
+    """Mass matrix for [base twist at the base origin; qd], by composite bodies.
+
+    A coordinate that moves several joints has the sum of their rows and columns, each times its ratio.
+    """
     robot = bodies.robot
     composite: dict[str, Composite] = {}
     for link, B in zip(robot.links, bodies.poses, strict=True):
@@ -170,15 +174,28 @@ def composite_mass_matrix(bodies: Bodies) -> list[list[Scalar]]:
         )
         composite[link.name] = Composite(m, c * m, about)
     for k in reversed(robot.traversal):
-        joint = robot.joints[k]
+        joint = robot.tree[k]
         composite[joint.parent] = composite[joint.parent] + composite[joint.child]
     basis = [Twist(e, ZERO) for e in (X, Y, Z)] + [Twist(ZERO, e) for e in (X, Y, Z)]
     columns = [*basis, *bodies.twists]
     momenta = [composite[robot.base_link].times(e) for e in basis]
-    momenta += [composite[j.child].times(S) for j, S in zip(robot.joints, bodies.twists, strict=True)]
+    momenta += [composite[j.child].times(S) for j, S in zip(robot.tree, bodies.twists, strict=True)]
     M: list[list[Scalar]] = [[0.0] * len(columns) for _ in columns]
     for row, h in enumerate(momenta):
-        path = robot.path_to(robot.joints[row - 6].child) if row >= 6 else ()
+        path = robot.path_to(robot.tree[row - 6].child) if row >= 6 else ()
         for column in (*range(6), *(6 + k for k in path)):
             M[row][column] = M[column][row] = power(h, columns[column])
-    return M
+    return _coupled_rows(robot, M) if robot.coupled else M
+
+
+def _coupled_rows(robot: Robot, M: Sequence[Sequence[Scalar]]) -> list[list[Scalar]]:
+    """The mass matrix for [base twist; qd] from that for the base and every joint of ``robot.tree``."""
+    moved: list[list[tuple[int, Scalar]]] = [[(i, 1)] for i in range(6 + len(robot.joints))]
+    for k, (i, ratio) in list(enumerate(robot.gears))[len(robot.joints) :]:
+        moved[6 + i].append((6 + k, ratio))
+    reduced: list[list[Scalar]] = [[0.0] * len(moved) for _ in moved]
+    for i, rows in enumerate(moved):
+        for j, columns in enumerate(moved[: i + 1]):
+            terms = (times(times(M[a][b], r), s) for a, r in rows for b, s in columns)
+            reduced[i][j] = reduced[j][i] = sum(terms)
+    return reduced

@@ -19,7 +19,7 @@ from screwkin.algebra.se3 import as_array
 from screwkin.compiler.program import kept
 from screwkin.gait.held import with_held_joints
 from screwkin.gait.stance import Stance
-from screwkin.kinematics.positions import chain_jacobian, successive_displacement
+from screwkin.kinematics.positions import chain_jacobian, successive_displacement, tree_positions
 from screwkin.model.robot import Limb, Robot
 
 POSE, POSITION = 6, 3
@@ -105,7 +105,11 @@ def _moving(robot: Robot) -> tuple[Robot | None, tuple[int, ...], Array, tuple[s
 def _chosen(robot: Robot, limb: Limb, home: Array) -> tuple[int, ...]:
     """Indices of a limb's joints that move, from the base on."""
     others = {i for other in robot.limbs if other.name != limb.name for i in robot.path_to(other.link)}
-    own = [i for i in robot.path_to(limb.link) if i not in others]
+    # What leads a coupled joint of any limb rests: to move it would move the limb twice.
+    others |= {
+        robot.gears[k][0] for one in robot.limbs for k in robot.path_to(one.link) if k >= len(robot.joints)
+    }
+    own = [i for i in robot.path_to(limb.link) if i < len(robot.joints) and i not in others]
     if limb.kind == "leg":
         count = min(POSE, len(own))
     else:
@@ -118,11 +122,14 @@ def _best(robot: Robot, limb: Limb, own: Sequence[int], count: int, home: Array)
     if not count:
         return ()
     path, rows = robot.path_to(limb.link), slice(0, 6) if count == POSE else slice(3, 6)
-    screws = [robot.joints[i].screw for i in path]
+    screws, start = (
+        [robot.tree[i].screw for i in path],
+        np.array(tree_positions(robot, home.tolist()))[list(path)],
+    )
     offsets = [np.zeros(len(path)), *(s * _AROUND * e for e in np.eye(len(path)) for s in (1, -1))]
     total = dict.fromkeys(combinations(own, count), 0.0)
     for offset in offsets:
-        thetas = list(home[list(path)] + offset)
+        thetas = list(start + offset)
         tip = successive_displacement(screws, thetas, A_ref_k=limb.frame).p
         columns = [as_array(at(tip, column)).astype(float)[rows] for column in chain_jacobian(screws, thetas)]
         for choice in total:

@@ -53,6 +53,7 @@ def walking_torques(robot: Robot, trajectory: Trajectory) -> Array:
     for i, foot in enumerate(trajectory.feet):
         away = (places[i] - places[1 - i]) * shares[:, 1 - i]
         carried = Wrench(ground.m + cross(away, ground.f), ground.f) * shares[:, i]
-        for j in robot.path_to(robot.limb(foot).link):
-            torque[:, j] -= as_array(power(carried, bodies.twists[j]), batch)
+        for k in robot.path_to(robot.limb(foot).link):
+            j, ratio = robot.gears[k]
+            torque[:, j] -= as_array(power(carried, bodies.twists[k] * ratio), batch)
     return torque

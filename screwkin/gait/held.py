@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -13,13 +14,15 @@ from screwkin.algebra.se3 import IDENTITY, Pose, Vector, as_array
 from screwkin.errors import InputError
 from screwkin.model.robot import Inertia, Joint, Limb, Link, Robot, Sole
 
+Kind = TypeVar("Kind", bound=Joint)
+
 
 def with_held_joints(robot: Robot, positions: Mapping[str, float]) -> Robot:
     """The robot whose named joints are held: their links become one body with the links they stand on.
 
     The zero pose of what is left is the one in which the held joints stand where they are held, so joint
-    positions, tips and the motion of every body stay what they are. Boxes, which contact alone needs, and
-    the table's text are left out.
+    positions, tips and the motion of every body stay what they are. Joints coupled to held ones are held
+    too. Boxes, which contact alone needs, and the table's text are left out.
 
     Args:
         robot: without closures.
@@ -35,14 +38,16 @@ def with_held_joints(robot: Robot, positions: Mapping[str, float]) -> Robot:
     for name in positions:
         robot.joint(name)
     moved, body = {robot.base_link: IDENTITY}, {robot.base_link: robot.base_link}
+    held = {c.name: c.ratio * positions[c.leader] + c.offset for c in robot.coupled if c.leader in positions}
+    held |= positions
     for i in robot.traversal:
-        joint = robot.joints[i]
-        at = positions.get(joint.name)
+        joint = robot.tree[i]
+        at = held.get(joint.name)
         before = moved[joint.parent]
         moved[joint.child] = before if at is None else before @ displacement(joint.screw, at)
         body[joint.child] = joint.child if at is None else body[joint.parent]
 
-    def joint_of(joint: Joint) -> Joint:
+    def joint_of(joint: Kind) -> Kind:
         return replace(joint, parent=body[joint.parent], screw=carry(moved[joint.parent], joint.screw))
 
     def limb_of(limb: Limb) -> Limb:
@@ -57,6 +62,7 @@ def with_held_joints(robot: Robot, positions: Mapping[str, float]) -> Robot:
         robot,
         links=tuple(_body(robot, name, body, moved) for name in robot.link_names if body[name] == name),
         joints=tuple(joint_of(robot.joints[i]) for i in left),
+        coupled=tuple(joint_of(joint) for joint in robot.coupled if joint.name not in held),
         limbs=tuple(map(limb_of, robot.limbs)),
         soles=tuple(map(sole_of, robot.soles)),
         postures=tuple(replace(p, q=tuple(p.q[i] for i in left)) for p in robot.postures),

@@ -148,7 +148,7 @@ def jacobian(
 
 @formula
 def limb_jacobian(robot: Robot, q: Joints, limb: str) -> Columns:
-    """Compact Jacobian of a limb's tip, base axes: a column for every joint of the limb.
+    """Compact Jacobian of a limb's tip, base axes: a column for every coordinate of the limb.
 
     Args:
         robot: n joints.
@@ -161,8 +161,8 @@ def limb_jacobian(robot: Robot, q: Joints, limb: str) -> Columns:
     chosen = robot.limb(limb)
     D = positions.link_displacements(robot, q)
     tip = positions.pose_in_base(robot, D, chosen.tip).p
-    screws = positions.joint_screws(robot, D)
-    return [at(tip, screws[i].twist) for i in robot.path_to(chosen.link)]
+    columns = positions.frame_jacobian(robot, positions.joint_twists(robot, D), chosen.tip)
+    return [at(tip, column) for column in columns.values()]
 
 
 @formula

@@ -76,7 +76,7 @@ def _own_joints(robot: Robot, limb: Limb) -> list[Joint]:
     """Joints on the way to a limb that move no other limb, from the base on; all of them where none is so."""
     path = robot.path_to(limb.link)
     shared = {i for other in robot.limbs if other.name != limb.name for i in robot.path_to(other.link)}
-    return [robot.joints[i] for i in path if i not in shared] or [robot.joints[i] for i in path]
+    return [robot.tree[i] for i in path if i not in shared] or [robot.tree[i] for i in path]
 
 
 def _root(axes: Sequence[Screw], tip: Vector) -> Vector:

@@ -11,17 +11,26 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.scalar import Scalar, larger, where
+from screwkin.model.coupled import tightened
 from screwkin.model.records import LIMIT_TOLERANCE
-from screwkin.model.robot import Robot
+from screwkin.model.robot import Joint, Robot
 
 CUT = 1e-9
 """Angles closer than this to -pi [rad] are given as pi, so that rounding does not choose the sign."""
 TURN = 2 * math.pi
 
 
+def limited_joints(robot: Robot) -> tuple[Joint, ...]:
+    """The joints in the order of q, with the limits and greatest speeds that coupled ones leave them."""
+    return tuple(tightened(joint, robot.coupled) for joint in robot.joints) if robot.coupled else robot.joints
+
+
 def limits_of(robot: Robot) -> tuple[Array, Array]:
-    """Lower and upper limits (n,) of all joints [rad or m], in table order; infinite where there is none."""
-    joints = robot.joints
+    """Lower and upper limits (n,) of all joints [rad or m], in table order; infinite where there is none.
+
+    They are those that a joint and the joints coupled to it leave together.
+    """
+    joints = limited_joints(robot)
     return np.array([j.lower for j in joints], dtype=float), np.array([j.upper for j in joints], dtype=float)
 
 

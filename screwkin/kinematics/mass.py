@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from screwkin.algebra.scalar import Scalar, plus
 from screwkin.algebra.screws import Displacement, at
 from screwkin.algebra.se3 import ZERO, Pose, Twist, Vector
+from screwkin.kinematics.positions import per_coordinate
 from screwkin.model.robot import Robot
 
 Placements = Sequence[Pose | Displacement]
@@ -25,18 +26,23 @@ def mass_center(robot: Robot, displacements: Placements) -> Vector:
 
 
 def mass_center_velocities(robot: Robot, displacements: Placements, twists: Sequence[Twist]) -> list[Vector]:
-    """Velocity of the CoM per unit rate of each joint: its subtree's share of the mass, on its screw."""
+    """Velocity of the CoM per unit rate of each coordinate of q."""
+    return per_coordinate(robot, subtree_velocities(robot, displacements, twists))
+
+
+def subtree_velocities(robot: Robot, displacements: Placements, twists: Sequence[Twist]) -> list[Vector]:
+    """The same of each joint of ``robot.tree``: its subtree's share of the mass, on its screw."""
     mass: dict[str, Scalar] = {}
     moment: dict[str, Vector] = {}
     for link, D in zip(robot.links, displacements, strict=True):
         mass[link.name] = link.mass
         moment[link.name] = (D @ link.com) * link.mass
     for i in reversed(robot.traversal):
-        joint = robot.joints[i]
+        joint = robot.tree[i]
         mass[joint.parent] = plus(mass[joint.parent], mass[joint.child])
         moment[joint.parent] = moment[joint.parent] + moment[joint.child]
     columns = []
-    for joint, twist in zip(robot.joints, twists, strict=True):
+    for joint, twist in zip(robot.tree, twists, strict=True):
         # A subtree of mass m with first moment h moves its share by (m v + omega x h) / M.
         spin = at(moment[joint.child], Twist(twist.omega, twist.v * mass[joint.child]))
         columns.append(spin.v * (1 / robot.mass))

@@ -6,10 +6,11 @@ Formulas over records: q is a sequence of scalars, and a scalar may be a whole b
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TypeVar
 
-from screwkin.algebra.scalar import Scalar
+from screwkin.algebra.scalar import Scalar, plus, structural, times
 from screwkin.algebra.screws import AT_REST, Displacement, Screw, advance, carry, displacement, transport
-from screwkin.algebra.se3 import IDENTITY, Pose, Twist
+from screwkin.algebra.se3 import IDENTITY, Pose, Twist, Vector
 from screwkin.model.robot import Robot
 
 
@@ -43,22 +44,48 @@ def chain_jacobian(screws: Sequence[Screw], thetas: Sequence[Scalar]) -> list[Tw
     return columns
 
 
+Column = TypeVar("Column", Vector, Twist, Scalar)
+
+
+def tree_positions(robot: Robot, q: Sequence[Scalar]) -> list[Scalar]:
+    """Positions of all joints of ``robot.tree`` [rad or m]: q, then those of the coupled joints."""
+    offsets = (structural(joint.offset) for joint in robot.coupled)
+    return [*q, *(plus(x, offset) for x, offset in zip(tree_rates(robot, q)[len(q) :], offsets, strict=True))]
+
+
+def tree_rates(robot: Robot, qd: Sequence[Scalar]) -> list[Scalar]:
+    """Rates, or accelerations, of all joints of ``robot.tree`` from those of q."""
+    return [times(qd[i], ratio) for i, ratio in robot.gears]
+
+
+def per_coordinate(robot: Robot, columns: Sequence[Column]) -> list[Column]:
+    """What each coordinate of q does, from what each joint of ``robot.tree`` does alone.
+
+    A coordinate moves its own joint and, by their ratios, those coupled to it: rates' columns add up, and so
+    do the efforts that are needed, by virtual power.
+    """
+    total = list(columns[: len(robot.joints)])
+    for (i, ratio), column in zip(robot.gears[len(total) :], columns[len(total) :], strict=True):
+        total[i] = total[i] + column * ratio
+    return total
+
+
 def link_displacements(robot: Robot, q: Sequence[Scalar], base: Displacement = AT_REST) -> list[Displacement]:
     """Displacement of every link from the zero pose, in the order of ``robot.links``.
 
     Expressed in the base frame; or in the frame to which ``base`` displaces it, at the cost of one product.
     """
-    carried = {robot.base_link: base}
+    carried, positions = {robot.base_link: base}, tree_positions(robot, q)
     for i in robot.traversal:
-        joint = robot.joints[i]
-        carried[joint.child] = advance(carried[joint.parent], joint.screw, q[i])
+        joint = robot.tree[i]
+        carried[joint.child] = advance(carried[joint.parent], joint.screw, positions[i])
     return [carried[name] for name in robot.link_names]
 
 
 def joint_screws(robot: Robot, displacements: Sequence[Displacement], T: Pose = IDENTITY) -> list[Screw]:
-    """Every joint's screw where it is now, in the frame to which T takes base coordinates."""
+    """Screws of the joints of ``robot.tree`` where they are now, in the frame to which T takes base axes."""
     carried = dict(zip(robot.link_names, displacements, strict=True))
-    return [carry(T, carry(carried[joint.parent], joint.screw)) for joint in robot.joints]
+    return [carry(T, carry(carried[joint.parent], joint.screw)) for joint in robot.tree]
 
 
 def joint_twists(robot: Robot, displacements: Sequence[Displacement], T: Pose = IDENTITY) -> list[Twist]:
@@ -73,8 +100,12 @@ def pose_in_base(robot: Robot, displacements: Sequence[Displacement], name: str)
 
 
 def frame_jacobian(robot: Robot, twists: Sequence[Twist], name: str) -> dict[int, Twist]:
-    """Twist of a frame per unit rate of each joint on its path: index of the joint to its column.
+    """Twist of a frame per unit rate of each coordinate of q that moves it: its index to its column.
 
     ``twists`` are those of ``joint_twists``; the columns are expressed where they are.
     """
-    return {i: twists[i] for i in robot.path_to(robot.frame(name)[0])}
+    columns: dict[int, Twist] = {}
+    for k in robot.path_to(robot.frame(name)[0]):
+        i, ratio = robot.gears[k]
+        columns[i] = columns[i] + twists[k] * ratio if i in columns else twists[k] * ratio
+    return columns

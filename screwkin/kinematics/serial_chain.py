@@ -33,12 +33,13 @@ from screwkin.algebra.se3 import (
 )
 from screwkin.compiler.program import kept
 from screwkin.kinematics import limits
-from screwkin.model.robot import Robot
+from screwkin.model.robot import Limb, Robot, refuse_coupled
 
 P = ParamSpec("P")
 T = TypeVar("T")
 SMALLEST = 1e-3
 """Least size of a limb [m]."""
+COUPLED = "use close_loops of its closed_mechanism, which solves positions of coupled joints"
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +80,7 @@ class SerialChain:
 
         Raises:
             UnknownNameError: no such limb.
+            InputError: one of its joints is coupled to another joint.
         """
         return _chain(robot, robot.limb(limb).name)
 
@@ -103,9 +105,7 @@ class SerialChain:
     @property
     def levers(self) -> list[float]:
         """For every joint, a bound of its axis's distance from the tip in any position [m]."""
-        places = [*(screw.s0 for screw in self.screws), self.tip.p]
-        steps = [float(norm(b - a)) for a, b in pairwise(places)]
-        return np.cumsum(steps[::-1])[::-1].tolist()
+        return _levers(self.screws, self.tip.p)
 
     def excess(self, q: Array) -> Array:
         """(...,) how far the worst joint of q (..., n) lies beyond its limits, negative inside."""
@@ -138,10 +138,22 @@ def cached(function: Callable[Concatenate[SerialChain, P], T]) -> Callable[Conca
     return once  # type: ignore[return-value]
 
 
+def limb_levers(robot: Robot, limb: Limb) -> list[float]:
+    """``SerialChain.levers`` of a limb, coupled joints among its own or not."""
+    screws = [robot.tree[i].screw for i in robot.path_to(limb.link)]
+    return _levers(nearest_points(screws, limb.frame.p), limb.frame.p)
+
+
+def _levers(screws: Sequence[Screw], tip: Vector) -> list[float]:
+    steps = [float(norm(b - a)) for a, b in pairwise([*(screw.s0 for screw in screws), tip])]
+    return np.cumsum(steps[::-1])[::-1].tolist()
+
+
 @kept
 def _chain(robot: Robot, limb: str) -> SerialChain:
     chosen = robot.limb(limb)
     path = robot.path_to(chosen.link)
+    refuse_coupled(robot, path, f"the serial chain of {chosen.name}", COUPLED)
     joints = [robot.joints[i] for i in path]
     lower, upper = (end[list(path)] for end in limits.limits_of(robot))
     turning = np.array([joint.type == "revolute" for joint in joints], dtype=bool)

@@ -64,7 +64,8 @@ def preference(mechanism: Mechanism) -> list[int]:
     real = [mechanism.position[name] for name in mechanism.robot.joint_names]
     if not mechanism.chains:
         return real[::-1]
-    users = Counter(i for limb in mechanism.robot.limbs for i in mechanism.robot.path_to(limb.link))
+    robot = mechanism.robot
+    users = Counter(i for limb in robot.limbs for i in {robot.gears[k][0] for k in robot.path_to(limb.link)})
     shared = [column for i, column in enumerate(real) if users[i] > 1]
     own = [column for column in real if column not in shared]
     tips = [chain for chain in mechanism.chains if chain.limb]

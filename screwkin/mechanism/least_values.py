@@ -102,7 +102,7 @@ def block_values(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, .
     for k in _certifiable(mechanism):
         (circuit,), own = mechanism.blocks[k]
         columns = [mechanism.secondary_columns[i] for i in own]
-        signs = dict(zip(mechanism.couplings, mechanism.circuit_matrix[circuit].tolist(), strict=True))
+        signs = dict(zip(mechanism.edges, mechanism.circuit_matrix[circuit].tolist(), strict=True))
         names = [mechanism.couplings[c] for c in columns]
         twists = _at_reference(mechanism, circuit, names, R, q)
         length = characteristic_length(robot)
@@ -125,10 +125,10 @@ def _at_reference(
         chain = SerialChain.of(robot, tip.limb.name)
         screws = seen_screws(chain, None, [q[i] for i in path], len(path) - 1)
         return dict(zip(names, screws, strict=True))
-    twists = dict(zip(mechanism.couplings, coupling_twists(mechanism, R, q), strict=True))
+    twists = dict(zip(mechanism.edges, coupling_twists(mechanism, R, q), strict=True))
     D = link_displacements(robot, q, Displacement(R, ZERO, ZERO))
     body, held = pose_in_base(robot, D, tip.name), mechanism.held(tip, Pose(R, ZERO))
     here = {name: at(body.p, twist) for name, twist in twists.items()}
-    joints = zip(robot.joint_names, joint_screws(robot, D), strict=True)
-    here |= {name: Screw(s.s, s.s0 - body.p, s.pitch).twist for name, s in joints}
+    joints = zip(robot.tree, joint_screws(robot, D), strict=True)
+    here |= {joint.name: Screw(s.s, s.s0 - body.p, s.pitch).twist for joint, s in joints}
     return here | dict(zip(tip.names, chain_twists(tip.couplings, body.R @ held.R.T, ZERO), strict=True))

@@ -12,7 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from screwkin.algebra.arrays import Integers
+from screwkin.algebra.arrays import Array, Booleans, Integers
 from screwkin.algebra.pattern import components
 from screwkin.algebra.se3 import IDENTITY, Pose
 from screwkin.mechanism import graph as graphs
@@ -60,9 +60,27 @@ class Mechanism:
     mobility: int
 
     @cached_property
+    def edges(self) -> tuple[str, ...]:
+        """Names of the graph's edges: the couplings, then the joints coupled to one of them by a ratio."""
+        return tuple(name for name, _, _ in self.graph.edges)
+
+    @cached_property
     def couplings(self) -> tuple[str, ...]:
         """Names of the couplings: the columns of the network matrix."""
-        return tuple(name for name, _, _ in self.graph.edges)
+        return self.edges[: len(self.edges) - len(self.robot.coupled)]
+
+    @cached_property
+    def gears(self) -> Array:
+        """(edges, couplings): rates of all edges per unit rate of each coupling, 1 for its own.
+
+        The network matrix adds the columns of coupled joints, times their ratios, to those of their leaders:
+        what Davies' method makes of a gear pair whose wheels turn about these joints.
+        """
+        G = np.eye(len(self.edges), len(self.couplings))
+        for row, joint in enumerate(self.robot.coupled, len(self.couplings)):
+            G[row, self.position[joint.leader]] = joint.ratio
+        G.flags.writeable = False
+        return G
 
     @property
     def choice(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -76,8 +94,13 @@ class Mechanism:
 
     @cached_property
     def circuit_matrix(self) -> Integers:
-        """(circuits, couplings) of -1, 0, 1."""
+        """(circuits, edges) of -1, 0, 1."""
         return graphs.circuit_matrix(self.graph)
+
+    @cached_property
+    def involved(self) -> Booleans:
+        """(circuits, couplings): which couplings move a circuit, themselves or by joints coupled to them."""
+        return np.abs(self.circuit_matrix) @ np.abs(self.gears) > 0
 
     def held(self, chain: VirtualChain, base: Pose) -> Pose:
         """What a chain without all six couplings holds: its tip's place in the zero pose, on a fixed base."""
@@ -98,12 +121,12 @@ class Mechanism:
     def _column_path(self, link: str) -> tuple[str, ...]:
         """Names of the couplings from the floor to a link: the waist's chain, then real joints."""
         waist = [name for chain in self.chains if chain.limb is None for name in chain.names]
-        return (*waist, *(self.robot.joints[i].name for i in self.robot.path_to(link)))
+        return (*waist, *(self.robot.tree[i].name for i in self.robot.path_to(link)))
 
     @cached_property
     def closing_matrix(self) -> Integers:
-        """(closings, couplings) of -1, 0, 1: circuits by what closes them, path a counting +1."""
-        C = np.zeros((len(self.closings), len(self.couplings)), dtype=np.int64)
+        """(closings, edges) of -1, 0, 1: circuits by what closes them, path a counting +1."""
+        C = np.zeros((len(self.closings), len(self.edges)), dtype=np.int64)
         for row, closing in enumerate(self.closings):
             for sign, path in ((1, closing.path_a), (-1, closing.path_b)):
                 for name in path:
@@ -112,9 +135,9 @@ class Mechanism:
 
     @cached_property
     def circuits(self) -> tuple[Mapping[str, int], ...]:
-        """Every circuit as coupling name to sign, in the order of the couplings."""
+        """Every circuit as name to sign, in the order of the edges."""
         return tuple(
-            {name: int(sign) for name, sign in zip(self.couplings, row, strict=True) if sign}
+            {name: int(sign) for name, sign in zip(self.edges, row, strict=True) if sign}
             for row in self.circuit_matrix
         )
 
@@ -132,8 +155,8 @@ class Mechanism:
 
     @cached_property
     def position(self) -> Mapping[str, int]:
-        """Column of every coupling."""
-        return {name: i for i, name in enumerate(self.couplings)}
+        """Column of every coupling; coupled joints, which have none, come after them."""
+        return {name: i for i, name in enumerate(self.edges)}
 
     @cached_property
     def primary_columns(self) -> list[int]:
@@ -148,12 +171,15 @@ class Mechanism:
     @cached_property
     def blocks(self) -> list[tuple[list[int], list[int]]]:
         """Independent systems of secondary rates: (circuits, indices in ``secondary``)."""
-        return components(self.circuit_matrix[:, self.secondary_columns])
+        return components(self.involved[:, self.secondary_columns])
 
     @cached_property
     def kutzbach(self) -> int:
-        """Mobility by counting, 6 (links - joints - 1) + sum of freedoms: blind to special geometry."""
-        return 6 * (len(self.links) - 1) - 5 * len(self.couplings)
+        """Mobility by counting, 6 (links - joints - 1) + sum of freedoms: blind to special geometry.
+
+        The gear pair of a coupled joint takes one freedom more.
+        """
+        return 6 * (len(self.links) - 1) - 5 * len(self.edges) - len(self.robot.coupled)
 
     def __repr__(self) -> str:
         return (
@@ -177,7 +203,10 @@ def virtual_chains(robot: Robot) -> tuple[VirtualChain, ...]:
 
 
 def coupling_graph(robot: Robot, chains: tuple[VirtualChain, ...]) -> CouplingGraph:
-    """Vertices and directed edges of the whole mechanism; closures weld the links that they join into one."""
+    """Vertices and directed edges of the whole mechanism; closures weld the links that they join into one.
+
+    Coupled joints come last, in table order.
+    """
     welded = {name: name for name in robot.link_names}
     if robot.base == "fixed":
         welded[robot.base_link] = FLOOR
@@ -186,14 +215,19 @@ def coupling_graph(robot: Robot, chains: tuple[VirtualChain, ...]) -> CouplingGr
         welded = {name: a if vertex == b else vertex for name, vertex in welded.items()}
 
     edges: list[tuple[str, str, str]] = []
+    following: dict[int, tuple[str, str, str]] = {}
     taken: set[int] = set()
 
     def add_joints(path: tuple[int, ...]) -> None:
         for i in path:
             if i not in taken:
                 taken.add(i)
-                joint = robot.joints[i]
-                edges.append((joint.name, welded[joint.parent], welded[joint.child]))
+                joint = robot.tree[i]
+                edge = (joint.name, welded[joint.parent], welded[joint.child])
+                if i < len(robot.joints):
+                    edges.append(edge)
+                else:
+                    following[i] = edge
 
     def add_chain(chain: VirtualChain, end: str) -> None:
         stations = [FLOOR, *(f"{chain.name}.{k}" for k in range(1, len(chain.couplings))), end]
@@ -206,6 +240,7 @@ def coupling_graph(robot: Robot, chains: tuple[VirtualChain, ...]) -> CouplingGr
             add_joints(robot.path_to(chain.limb.link))
             add_chain(chain, welded[chain.limb.link])
     add_joints(robot.traversal)
+    edges += [following[i] for i in sorted(following)]
 
     vertices = dict.fromkeys([FLOOR, *(welded[name] for name in robot.link_names)])
     vertices |= dict.fromkeys(vertex for _, tail, head in edges for vertex in (tail, head))
@@ -217,7 +252,8 @@ def unchosen(robot: Robot) -> Mechanism:
     """The mechanism of a robot before any choice: all its couplings are secondary."""
     chains = virtual_chains(robot)
     graph = coupling_graph(robot, chains)
-    return Mechanism(robot, chains, graph, (), tuple(name for name, _, _ in graph.edges), 0)
+    couplings = tuple(name for name, _, _ in graph.edges)[: len(graph.edges) - len(robot.coupled)]
+    return Mechanism(robot, chains, graph, (), couplings, 0)
 
 
 def mechanism_of(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, ...]) -> Mechanism:

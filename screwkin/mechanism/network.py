@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Integers
-from screwkin.algebra.scalar import Scalar, is_jax
+from screwkin.algebra.scalar import Scalar, is_jax, structural
 from screwkin.algebra.screws import at
 from screwkin.algebra.se3 import NO_TWIST, ZERO, Pose, Rotation, Twist, Vector, as_array, bracket
 from screwkin.kinematics.formula import formula
@@ -25,7 +25,7 @@ from screwkin.mechanism.mechanism import Mechanism
 def coupling_twists(
     mechanism: Mechanism, R: Rotation, q: Sequence[Scalar], point: Vector = ZERO
 ) -> list[Twist]:
-    """Normalised screw of every coupling, world axes.
+    """Normalised screw of every edge of the mechanism, world axes: the couplings', then the coupled joints'.
 
     Args:
         mechanism: the closed mechanism.
@@ -37,24 +37,24 @@ def coupling_twists(
     robot = mechanism.robot
     D = link_displacements(robot, q)
     turned = Pose(R, ZERO)
-    twists = dict(zip(robot.joint_names, joint_twists(robot, D, turned), strict=True))
+    twists = {joint.name: t for joint, t in zip(robot.tree, joint_twists(robot, D, turned), strict=True)}
     for chain in mechanism.chains:
         body = turned if chain.limb is None else turned @ pose_in_base(robot, D, chain.limb.tip)
         R_chain = body.R @ mechanism.held(chain, turned).R.T
         twists |= zip(chain.names, chain_twists(chain.couplings, R_chain, body.p), strict=True)
-    return [at(point, twists[name]) for name in mechanism.couplings]
+    return [at(point, twists[name]) for name in mechanism.edges]
 
 
 @formula
 def coupling_screws(mechanism: Mechanism, T_world_base: Pose, q: Joints) -> Columns:
-    """Normalised screws of all couplings of the closed mechanism, world axes.
+    """Normalised screws of all couplings of the closed mechanism, world axes, and of its coupled joints.
 
     Args:
         mechanism: from ``closed_mechanism``.
         state:
 
     Returns:
-        S (..., 6, couplings), columns [omega; v at the base origin].
+        S (..., 6, edges), columns [omega; v at the base origin] in the order of ``mechanism.edges``.
     """
     return coupling_twists(mechanism, T_world_base.R, q)
 
@@ -62,10 +62,14 @@ def coupling_screws(mechanism: Mechanism, T_world_base: Pose, q: Joints) -> Colu
 def network_blocks(mechanism: Mechanism, twists: Sequence[Twist]) -> list[list[Twist]]:
     """The network matrix as rows of signed screws: one row of blocks for every circuit."""
     signed = {1: lambda t: t, -1: lambda t: -t, 0: lambda t: NO_TWIST}
-    return [
-        [signed[int(sign)](twist) for sign, twist in zip(row, twists, strict=True)]
-        for row in mechanism.circuit_matrix
-    ]
+    count, rows = len(mechanism.couplings), []
+    for signs in mechanism.circuit_matrix:
+        every = [signed[int(sign)](twist) for sign, twist in zip(signs, twists, strict=True)]
+        for joint, twist in zip(mechanism.robot.coupled, every[count:], strict=True):
+            column = mechanism.position[joint.leader]
+            every[column] = every[column] + twist * structural(joint.ratio)
+        rows.append(every[:count])
+    return rows
 
 
 def network_of_twists(
@@ -74,23 +78,24 @@ def network_of_twists(
     batch: tuple[int, ...] = (),
     circuits: Integers | None = None,
 ) -> Any:
-    """N (..., 6 circuits, couplings) from the couplings' screws: rows [omega; v] of every circuit.
+    """N (..., 6 circuits, couplings) from the edges' screws: rows [omega; v] of every circuit.
 
-    ``circuits`` (k, couplings) is another choice of circuits than the mechanism's own.
+    ``circuits`` (k, edges) is another choice of circuits than the mechanism's own.
     """
     return assembled(mechanism, as_array(list(twists), batch).swapaxes(-1, -2), circuits)
 
 
 def assembled(mechanism: Mechanism, S: Any, circuits: Integers | None = None) -> Any:
-    """The same from the couplings' screws as columns S (..., 6, couplings)."""
+    """The same from the edges' screws as columns S (..., 6, edges)."""
     B = (mechanism.circuit_matrix if circuits is None else circuits).astype(float)
     signs = B.reshape(*(1 for _ in S.shape[:-2]), len(B), 1, B.shape[1])
     N = signs * S[..., None, :, :]
-    return N.reshape(*S.shape[:-2], 6 * len(B), len(mechanism.couplings))
+    N = N.reshape(*S.shape[:-2], 6 * len(B), B.shape[1])
+    return N @ mechanism.gears if mechanism.robot.coupled else N
 
 
 def twist_rates(mechanism: Mechanism, twists: Sequence[Twist], rates: Sequence[Scalar]) -> list[Twist]:
-    """Time derivative of every coupling's screw when all couplings move, at the fixed point.
+    """Time derivative of every edge's screw when all edges move at some rates, at the fixed point.
 
     The link on which a screw stands carries it: the derivative is the bracket of that link's twist with it.
     """

@@ -36,9 +36,9 @@ class ScrewRow:
 
 
 def screw_rows(robot: Robot) -> list[ScrewRow]:
-    """The screw table of a robot, numeric or symbolic, in table order."""
+    """The screw table of a robot, numeric or symbolic, in table order; coupled joints last."""
     rows = []
-    for joint in robot.joints:
+    for joint in robot.tree:
         s, s0, pitch = joint.screw.s, joint.screw.s0, joint.screw.pitch
         moment = None if joint.screw.is_translation else cross(s0, s)
         rows.append(ScrewRow(joint.name, joint.type, s, s0, pitch, moment))

@@ -126,7 +126,7 @@ def secondary_accelerations(
     S = coupling_screws(mechanism, State(T_world_base, q))
     S = xp.broadcast_to(S, (*batch, *S.shape[-2:]))
     rates = xp.broadcast_to(rates, (*batch, rates.shape[-1]))
-    scalars = unstack(rates)
+    scalars = unstack(rates @ mechanism.gears.T if mechanism.robot.coupled else rates)
     moving = twist_rates(mechanism, [twist_from_array(S[..., c]) for c in range(S.shape[-1])], scalars)
     bias = as_array([dS * rate for dS, rate in zip(moving, scalars, strict=True)], batch)
     coriolis = xp.matmul(mechanism.circuit_matrix.astype(float), bias).reshape(

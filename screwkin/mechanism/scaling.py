@@ -15,7 +15,7 @@ from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.screws import Screw
 from screwkin.algebra.se3 import Twist, as_array
 from screwkin.compiler.program import kept
-from screwkin.kinematics.serial_chain import SerialChain
+from screwkin.kinematics.serial_chain import limb_levers
 from screwkin.mechanism.mechanism import WAIST, Mechanism
 from screwkin.model.robot import Robot
 
@@ -33,11 +33,11 @@ def characteristic_length(robot: Robot) -> float:
     Of a loop it is the largest distance of its axes from their centre, in the zero pose. Joints of no limb
     and no loop count only where there are no others. A robot whose axes and tips all meet has size 1 m.
     """
-    sizes = [float(max(SerialChain.of(robot, limb.name).levers, default=0.0)) for limb in robot.limbs]
+    sizes = [float(max(limb_levers(robot, limb), default=0.0)) for limb in robot.limbs]
     loops = [set(robot.path_to(c.link_a)) ^ set(robot.path_to(c.link_b)) for c in robot.closures]
     if not robot.limbs and not robot.closures:
-        loops = [set(range(len(robot.joints)))]
-    sizes += [_radius([robot.joints[i].screw for i in sorted(loop)]) for loop in loops]
+        loops = [set(range(len(robot.tree)))]
+    sizes += [_radius([robot.tree[i].screw for i in sorted(loop)]) for loop in loops]
     size = max(sizes, default=0.0)
     return size if size > 1e-9 else 1.0
 
@@ -79,7 +79,7 @@ def reference_couplings(mechanism: Mechanism, circuit: Sequence[int]) -> list[in
 
     Args:
         mechanism: the closed mechanism.
-        circuit: signs (couplings) of the circuit, a row of ``circuit_matrix``.
+        circuit: what of the couplings moves in the circuit, a row of ``involved``.
     """
     inside = [c for c, sign in enumerate(circuit) if sign]
     names = mechanism.couplings
@@ -93,7 +93,7 @@ def reference_couplings(mechanism: Mechanism, circuit: Sequence[int]) -> list[in
 def _reference_mask(mechanism: Mechanism) -> Array:
     """(circuits, 1, couplings) of 1.0 for ``reference_couplings``, else 0.0."""
     mask = np.zeros((len(mechanism.circuits), 1, len(mechanism.couplings)))
-    for row, circuit in zip(mask, mechanism.circuit_matrix.tolist(), strict=True):
+    for row, circuit in zip(mask, mechanism.involved.tolist(), strict=True):
         row[0, reference_couplings(mechanism, circuit)] = 1.0
     return mask
 

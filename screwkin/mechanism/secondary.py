@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+import numpy as np
+
 from screwkin.algebra.scalar import Scalar, abs_, sqrt
 from screwkin.algebra.screws import Displacement, at, turn
 from screwkin.algebra.se3 import IDENTITY, NO_TWIST, UNTURNED, ZERO, Pose, Rotation, Twist, Vector, cross, dot
@@ -28,8 +30,13 @@ from screwkin.model.robot import Robot
 
 
 def formula_blocks(mechanism: Mechanism) -> list[int]:
-    """Indices of the blocks that have a formula: one circuit, six secondary couplings."""
-    return [k for k, (circuits, own) in enumerate(mechanism.blocks) if len(circuits) == 1 and len(own) == 6]
+    """Indices of the blocks that have a formula: one circuit, six secondary couplings, no coupled joints."""
+    coupled = np.any(mechanism.circuit_matrix[:, len(mechanism.couplings) :], axis=1).tolist()
+    return [
+        k
+        for k, (circuits, own) in enumerate(mechanism.blocks)
+        if len(circuits) == 1 and len(own) == 6 and not coupled[circuits[0]]
+    ]
 
 
 @kept
@@ -62,7 +69,7 @@ def secondary_door(robot: Robot, primary: tuple[str, ...], secondary: tuple[str,
     least = []
     for k in formula_blocks(mechanism):
         (circuit,), own = mechanism.blocks[k]
-        signs = dict(zip(mechanism.couplings, mechanism.circuit_matrix[circuit].tolist(), strict=True))
+        signs = dict(zip(mechanism.edges, mechanism.circuit_matrix[circuit].tolist(), strict=True))
         wanted = NO_TWIST
         for name in robot.joint_names:
             if name in imposed:
@@ -148,7 +155,7 @@ def _bound(
 
 def tip_of(mechanism: Mechanism, circuit: int) -> VirtualChain | None:
     """The virtual chain whose tip is the reference point of a circuit; None if it is another point."""
-    row = mechanism.circuit_matrix[circuit].tolist()
+    row = mechanism.involved[circuit].tolist()
     reference = {mechanism.couplings[c] for c in reference_couplings(mechanism, row)}
     for chain in mechanism.chains:
         turning = {name for name in chain.names if name.split(".")[1][0] == "r"}
@@ -184,7 +191,7 @@ def _system(
     split, point = None, cross(first.omega, first.v)
     for limb in robot.limbs:
         path = robot.path_to(limb.link)
-        if [robot.joint_names[i] for i in path] == list(names):
+        if [robot.tree[i].name for i in path] == list(names):
             motion = LimbMotion.of(robot, limb, D, q, len(path) // 2)
             return motion.split, motion.point, motion.axes, motion.twists
         if {f"{limb.tip}.{axis}" for axis in ("rx", "ry", "rz")} == set(names[-3:]):

@@ -119,7 +119,7 @@ def refuse_singular(
 
 def _screws(N: Array, mechanism: Mechanism, columns: Sequence[int]) -> Array:
     """Screws (k, 6) of some couplings, from the first circuit that holds each."""
-    rows = [int(np.flatnonzero(mechanism.circuit_matrix[:, c])[0]) for c in columns]
+    rows = [int(np.flatnonzero(mechanism.involved[:, c])[0]) for c in columns]
     return np.array([N[6 * r : 6 * r + 6, c] for r, c in zip(rows, columns, strict=True)])
 
 

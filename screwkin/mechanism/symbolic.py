@@ -19,7 +19,9 @@ from screwkin.kinematics.positions import joint_twists, link_displacements, pose
 from screwkin.mechanism.chains import chain_screws
 from screwkin.mechanism.mechanism import Mechanism, unchosen
 from screwkin.mechanism.network import network_blocks
-from screwkin.model.robot import Robot
+from screwkin.model.robot import Robot, refuse_coupled
+
+NUMERIC = "ask network_matrix for numbers, which couples them"
 
 Matrix = Any
 Symbol = Any
@@ -98,8 +100,9 @@ def symbolic_loops(robot: Robot) -> tuple[SymbolicLimb, ...]:
     """The loops of a mechanism without limbs: their rows of the network matrix, in sympy.
 
     Raises:
-        InputError: the table has no loops.
+        InputError: the table has no loops, or coupled joints.
     """
+    refuse_coupled(robot, range(len(robot.tree)), "the symbolic network matrix", NUMERIC)
     mechanism = _mechanism(named_formulas(robot))
     robot, symbols = mechanism.robot, coupling_symbols(mechanism)
     q = [symbols[name] for name in robot.joint_names]
@@ -138,12 +141,19 @@ def named_formulas(robot: Robot) -> Robot:
 
 
 def limb_alone(robot: Robot, limb: str) -> Robot:
-    """The robot with nothing but one limb and the links and joints that lead to it."""
+    """The robot with nothing but one limb and the links and joints that lead to it.
+
+    Raises:
+        InputError: one of these joints is coupled to another joint.
+    """
     chosen = robot.limb(limb)
-    joints = tuple(robot.joints[i] for i in robot.path_to(chosen.link))
+    path = robot.path_to(chosen.link)
+    refuse_coupled(robot, path, f"the symbolic model of {chosen.name}", NUMERIC)
+    joints = tuple(robot.joints[i] for i in path)
     names = {robot.base_link, *(joint.child for joint in joints)}
     links = tuple(link for link in robot.links if link.name in names)
-    return replace(robot, links=links, joints=joints, limbs=(chosen,), soles=(), closures=(), postures=())
+    bare: dict[str, Any] = dict.fromkeys(("soles", "closures", "coupled", "postures"), ())
+    return replace(robot, links=links, joints=joints, limbs=(chosen,), **bare)
 
 
 def _mechanism(robot: Robot) -> Mechanism:

@@ -38,7 +38,7 @@ def solvable_limbs(robot: Robot, secondary: Sequence[str]) -> tuple[str, ...]:
             len(path) in (3, 6)
             and len(own) == 6
             and not others & set(path)
-            and {robot.joint_names[i] for i in path} <= set(secondary)
+            and {robot.tree[i].name for i in path} <= set(secondary)
             and not (own - free) & set(secondary)
         )
 
@@ -93,8 +93,8 @@ def joint_rates(
 def _all_limbs(robot: Robot) -> tuple[Limb, ...]:
     if not robot.limbs or not follows(robot, robot.joint_names):
         raise InputError(
-            f"{robot.name}: rates follow limbs of six joints, or of three, that share none and have no "
-            "loops of their own; ask for tips, com or zmp"
+            f"{robot.name}: rates follow limbs of six joints, or of three, that share none and have neither "
+            "loops of their own nor coupled joints; ask secondary_rates of its closed_mechanism"
         )
     return robot.limbs
 

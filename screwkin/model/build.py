@@ -9,10 +9,12 @@ from typing import Any, get_args
 from screwkin.algebra.scalar import Scalar, times
 from screwkin.algebra.screws import INFINITE, Screw
 from screwkin.algebra.se3 import IDENTITY, UNTURNED, ZERO, Pose, Vector, X, Y, Z, rotate
-from screwkin.model.mirror import closes_within, image, interleaved
+from screwkin.model.coupled import composed, coupled_joint
+from screwkin.model.mirror import closes_within, image, interleaved, mirrored_mimics
 from screwkin.model.records import (
     Box,
     Closure,
+    CoupledJoint,
     Inertia,
     Joint,
     Limb,
@@ -38,9 +40,10 @@ def with_images(rows: Rows, mirrored: Sequence[Mirrored], around: Collection[str
     """
     entries = dict(rows.entries)
     for limb in mirrored:
+        following = mirrored_mimics([row for _, row in rows.good("joint")], limb.part, around)
         for table, own in entries.items():
             images = [
-                replace(entry, row=image(entry.row, limb.part, entry.text("name") in around))
+                replace(entry, row=image(entry.row, limb.part, entry.text("name") in around, following))
                 if entry.row is not None and _belongs(table, entry.row, limb)
                 else None
                 for entry in own
@@ -77,6 +80,7 @@ def robot_from_rows(rows: Rows) -> RobotRecord:
         base_link=robot.base_link,
         links=tuple(_link(row, origin.get(row.name, ZERO)) for _, row in rows.good("link")),
         joints=joints,
+        coupled=coupled_of(rows),
         limbs=tuple(
             Limb(row.name, row.kind, row.link, row.tip, _pose(row.frame), row.chain)
             for _, row in rows.good("limb")
@@ -96,8 +100,19 @@ def robot_from_rows(rows: Rows) -> RobotRecord:
 
 
 def joints_of(rows: Rows) -> tuple[Joint, ...]:
-    """The joints in table order."""
-    return tuple(_joint(row) for _, row in rows.good("joint"))
+    """The joints with a coordinate, in table order."""
+    return tuple(_joint(row) for _, row in rows.good("joint") if row.mimic is None)
+
+
+def coupled_of(rows: Rows) -> tuple[CoupledJoint, ...]:
+    """The coupled joints in table order; one that follows another coupled joint follows that one's leader."""
+    couplings = {
+        row.name: (row.mimic.joint, row.mimic.ratio, row.mimic.offset)
+        for _, row in rows.good("joint")
+        if row.mimic is not None
+    }
+    following = [row for _, row in rows.good("joint") if row.mimic is not None]
+    return tuple(coupled_joint(_joint(row), composed(couplings, row.name)) for row in following)
 
 
 def _joint(row: JointRow) -> Joint:

@@ -38,7 +38,7 @@ def changed_text(
             changes["link", links[link], "mass"] = _number(mass, f"masses[{link!r}]")
     for what in ("limits", "velocity", "effort"):
         for joint, value in wishes[what].items():
-            if _has_row(joint, "joint", joints, (one.name for one in robot.joints)):
+            if _has_row(joint, "joint", joints, (one.name for one in robot.tree)):
                 row: Place = ("joint", joints[joint])
                 changes |= {(*row, key): x for key, x in _joint_values(what, joint, value).items()}
     return edited(text, changes)
@@ -57,7 +57,7 @@ def check_followed(robot: RobotRecord, wishes: Wishes) -> None:
         "effort": lambda joint: joint.effort,
     }
     for what, wanted in wishes.items():
-        named: Sequence[Any] = robot.links if what == "masses" else robot.joints
+        named: Sequence[Any] = robot.links if what == "masses" else robot.tree
         rows = {row.name: row for row in named}
         for name, value in wanted.items():
             formula = any(isinstance(x, str) for x in np.ravel(np.array(value, dtype=object)))

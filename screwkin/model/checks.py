@@ -71,6 +71,10 @@ def _joint(joint: JointRow) -> Iterator[tuple[str, str, str]]:
         yield "pitch", f"{joint.pitch:g} on a {joint.type} joint", 'Leave it out, or write type = "helical"'
     if joint.lower > joint.upper:
         yield "lower", f"{joint.lower:g} is above upper {joint.upper:g}", "Swap the limits"
+    if joint.mimic is not None and not math.isfinite(joint.mimic.ratio):
+        yield "mimic.ratio", f"is {joint.mimic.ratio:g}", "Write a finite number"
+    if joint.mimic is not None and not math.isfinite(joint.mimic.offset):
+        yield "mimic.offset", f"is {joint.mimic.offset:g}", "Write a finite number"
 
 
 def sole_faults(sole: SoleRow | Sole) -> Iterator[tuple[str, str, str]]:

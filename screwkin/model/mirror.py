@@ -13,7 +13,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any, TypeVar
 
 from screwkin.algebra.se3 import Vector
-from screwkin.model.schema import InertiaRow, JointRow, Row
+from screwkin.model.schema import InertiaRow, JointRow, MimicRow, Row
 
 Item = TypeVar("Item")
 
@@ -64,19 +64,53 @@ def turns_around(joint: JointRow) -> bool:
     return bool(s.x == 0 and s.z == 0) if joint.type == "prismatic" else bool(s.y == 0)
 
 
-def image(row: Row, part: Collection[str], around: bool = False) -> Row:
+def mirrored_mimics(
+    joints: Sequence[JointRow], part: Collection[str], around: Collection[str]
+) -> Mapping[str, MimicRow]:
+    """What the images of coupled joints follow, by the names of the joints that they are the images of.
+
+    A leader that is reflected too is followed by its image; where the position of either changes its sign,
+    so does the ratio, and with the follower's the offset.
+
+    Args:
+        joints: rows of all joints.
+        part: names of the links that are reflected.
+        around: names of the joints whose mirrored position changes sign.
+    """
+    reflected = {joint.name for joint in joints if joint.child in part}
+    following: dict[str, MimicRow] = {}
+    for joint in joints:
+        if joint.mimic is not None and joint.name in reflected:
+            leader, sign = joint.mimic.joint, -1.0 if joint.name in around else 1.0
+            turned = -sign if leader in reflected and leader in around else sign
+            following[joint.name] = MimicRow.model_construct(
+                joint=swapped(leader) if leader in reflected else leader,
+                ratio=turned * joint.mimic.ratio + 0.0,
+                offset=sign * joint.mimic.offset + 0.0,
+            )
+    return following
+
+
+def image(
+    row: Row,
+    part: Collection[str],
+    around: bool = False,
+    following: Mapping[str, MimicRow] | None = None,
+) -> Row:
     """The mirror image of a row, with whatever stands within it.
 
     Args:
         row: of a link, a joint, a closure, a limb or a sole.
         part: names of the links that are reflected with it.
         around: whether a joint's position changes sign; what ``turns_around`` says of its numeric twin.
+        following: what the images of coupled joints follow, from ``mirrored_mimics``.
     """
     new = {key: _reflected(key, getattr(row, key), part) for key in type(row).model_fields}
     if isinstance(row, JointRow):
         slides = row.type == "prismatic"
         new["s"] = new["s"] if slides != around else -new["s"]
         new["pitch"] = row.pitch if slides else -row.pitch
+        new["mimic"] = (following or {}).get(row.name)
         if around:  # 0.0 - x, so that no limit reads -0
             new["lower"], new["upper"] = 0.0 - row.upper, 0.0 - row.lower
     elif isinstance(row, InertiaRow):
@@ -86,6 +120,8 @@ def image(row: Row, part: Collection[str], around: bool = False) -> Row:
 
 def _reflected(key: str, value: Any, part: Collection[str]) -> Any:
     """A value of a row, reflected: a name, a point, turns about the fixed axes, or a row or list of these."""
+    if isinstance(value, MimicRow):
+        return value  # its joints are known to the whole table only: see mirrored_mimics
     if isinstance(value, Row):
         return image(value, part)
     if isinstance(value, list):

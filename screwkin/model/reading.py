@@ -9,12 +9,13 @@ from typing import Any
 
 from screwkin.algebra.scalar import Scalar
 from screwkin.errors import Fault, TableError, near
-from screwkin.model.build import joints_of, robot_from_rows, with_images
+from screwkin.model.build import coupled_of, joints_of, robot_from_rows, with_images
 from screwkin.model.checks import row_faults
+from screwkin.model.coupled import coupling_text, tightened
 from screwkin.model.expression import listed, resolve_parameters
 from screwkin.model.mesh_files import full_path
 from screwkin.model.mirror import turns_around
-from screwkin.model.records import LIMIT_TOLERANCE, Joint, Link, RobotRecord
+from screwkin.model.records import LIMIT_TOLERANCE, CoupledJoint, Joint, Link, RobotRecord
 from screwkin.model.rows import Rows, parameters_of, read_rows
 from screwkin.model.structure import Mirrored, joint_names, mirrored_limbs, structure_faults
 from screwkin.model.toml import read_toml
@@ -54,7 +55,14 @@ def checked_table(data: Mapping[str, Any]) -> CheckedTable:
     faults += [*more, *wrong, *row_faults(rows), *structural[len(wrong) :]]
     around = frozenset(joint.name for _, joint in rows.good("joint") if turns_around(joint))
     whole = with_images(rows, mirrored, around)
-    faults += _posture_faults(rows, joints_of(whole), joint_names(rows, mirrored))
+    known = joint_names(rows, mirrored)
+    circles = [*_leader_faults(whole, known)]
+    structural += circles
+    faults += circles
+    coupled = () if circles else coupled_of(whole)
+    joints = [tightened(joint, coupled) for joint in joints_of(whole)]
+    faults += _range_faults(whole, joints, coupled)
+    faults += _posture_faults(rows, joints, coupled, known)
     return CheckedTable(numbers, whole, mirrored, around, structural, faults)
 
 
@@ -90,15 +98,53 @@ def _with_meshes_of(folder: Path, link: Link) -> Link:
     return replace(link, shapes=tuple(replace(s, file=full_path(s.file, folder)) for s in link.shapes))
 
 
-def _posture_faults(rows: Rows, joints: Sequence[Joint], known: Sequence[str]) -> Iterator[Fault]:
-    """Postures name known joints within their limits; a floating base has a height."""
+def _leader_faults(rows: Rows, known: Sequence[str]) -> Iterator[Fault]:
+    """Every coupled joint follows a known joint, and by way of others in the end one with a coordinate."""
+    leader = {row.name: row.mimic.joint for _, row in rows.good("joint") if row.mimic is not None}
+    places = set[str]()  # a mirrored row stands where the row does that it is the image of
+    for where, row in rows.good("joint"):
+        if row.name not in leader or where in places:
+            continue
+        places.add(where)
+        path = [row.name]
+        while path[-1] in leader and path[-1] not in path[:-1]:
+            path.append(leader[path[-1]])
+        if leader[row.name] not in known:
+            fix = f"{near(leader[row.name], known)}Joints: {listed(known)}"
+            yield Fault(where, "mimic.joint", f"there is no joint {leader[row.name]!r}", fix)
+        elif path[-1] == row.name == min(path):
+            found = f"joints follow one another in a circle: {' -> '.join(path)}"
+            yield Fault(where, "mimic.joint", found, "Let one of them lead, without mimic")
+
+
+def _range_faults(rows: Rows, joints: Sequence[Joint], coupled: Sequence[CoupledJoint]) -> Iterator[Fault]:
+    """Limits of coupled joints leave their leaders a position, if the leaders' own limits do."""
+    places = {row.name: where for where, row in rows.good("joint")}
+    own = {joint.name: joint for joint in joints_of(rows)}
+    for joint in joints:
+        alone = own[joint.name]
+        if alone.lower <= alone.upper and joint.lower > joint.upper + LIMIT_TOLERANCE:
+            following = [one for one in coupled if one.leader == joint.name]
+            found = f"leave {joint.name!r} no position: {listed(map(coupling_text, following))}"
+            fix = "Widen the limits of these joints, or leave out lower and upper of the coupled ones"
+            yield Fault(places[following[0].name], "lower, upper", found, fix)
+
+
+def _posture_faults(
+    rows: Rows, joints: Sequence[Joint], coupled: Sequence[CoupledJoint], known: Sequence[str]
+) -> Iterator[Fault]:
+    """Postures name joints with a coordinate, within their limits; a floating base has a height."""
+    leaders = {one.name: one.leader for one in coupled}
     floating = rows.robot.raw.get("base") == "floating"
     for where, row in rows.good("posture"):
         if floating and row.base_height is None:
             fix = "Write the height of the base above the floor in m"
             yield Fault(where, "base_height", "is missing", fix)
         for name in row.q:
-            if name not in known:
+            if name in leaders:
+                fix = f"Leave it out: it follows {leaders[name]!r}"
+                yield Fault(where, f"q.{name}", "is a coupled joint", fix)
+            elif name not in known:
                 fix = f"{near(name, known)}Joints: {listed(known)}"
                 yield Fault(where, f"q.{name}", f"there is no joint {name!r}", fix)
         for joint in joints:

@@ -15,6 +15,7 @@ from screwkin.errors import Fault, TableError
 from screwkin.model.reading import checked_table
 from screwkin.model.records import (
     Closure,
+    CoupledJoint,
     Joint,
     Limb,
     Link,
@@ -32,6 +33,7 @@ from screwkin.model.values import UNIT_TOLERANCE
 _KINDS: Mapping[str, tuple[str, type]] = {
     "link": ("links", Link),
     "joint": ("joints", Joint),
+    "coupled": ("coupled", CoupledJoint),
     "closure": ("closures", Closure),
     "limb": ("limbs", Limb),
     "sole": ("soles", Sole),
@@ -95,7 +97,8 @@ def _table_faults(robot: RobotRecord, table: str) -> Iterator[Fault]:
         return
     title = "limb" if table == "sole" else "name"
     for i, row in enumerate(rows):
-        where = label(table, i, {title: getattr(row, title, None)})
+        first = len(robot.joints) if table == "coupled" else 0
+        where = label("joint" if first else table, first + i, {title: getattr(row, title, None)})
         wrong = [*_misfits(row, kind, "")] or [*_discord(robot, row)]
         yield from (Fault(where, place.lstrip("."), found, fix) for place, found, fix in wrong)
 
@@ -106,6 +109,10 @@ def _discord(robot: RobotRecord, row: Any) -> Iterator[tuple[str, str, str]]:
         yield "q", f"has {len(row.q)} positions", f"Give one for each of the {len(robot.joints)} joints"
     if isinstance(row, Joint) and row.type == "prismatic" and not row.screw.is_translation:
         yield "screw.pitch", f"{row.screw.pitch} on a prismatic joint", "Give the pitch INFINITE"
+    if isinstance(row, CoupledJoint):
+        for key in ("ratio", "offset"):
+            if is_open(getattr(row, key)):
+                yield key, f"is {getattr(row, key)}", "Give a number: couplings hold no symbols"
     for f in fields(row):
         if isinstance(getattr(row, f.name), Pose):
             yield from _skewed(getattr(row, f.name), f.name)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -103,6 +104,19 @@ class Joint:
 
 
 @dataclass(frozen=True)
+class CoupledJoint(Joint):
+    """A joint without a coordinate of its own: its position is ``ratio`` times its leader's plus ``offset``.
+
+    The leader is a joint with a coordinate; the offset has the unit of this joint's position [rad or m], the
+    ratio that of the two positions.
+    """
+
+    leader: str
+    ratio: float
+    offset: float
+
+
+@dataclass(frozen=True)
 class Closure:
     """Two frames on two links that must coincide: it closes a loop of the tree."""
 
@@ -156,6 +170,7 @@ class RobotRecord:
         parameters: values of the named parameters: floats, or symbols.
         text: of the table that it was read from; empty if there is none.
         path: of that table; empty if there is none.
+        coupled: joints that follow one of ``joints``, in table order.
     """
 
     name: str
@@ -174,6 +189,12 @@ class RobotRecord:
     parameters: Mapping[str, Scalar] = field(default_factory=dict)
     text: str = ""
     path: str = ""
+    coupled: tuple[CoupledJoint, ...] = ()
+
+    @cached_property
+    def tree(self) -> tuple[Joint, ...]:
+        """All joints of the tree: those with a coordinate, in the order of q, then the coupled ones."""
+        return (*self.joints, *self.coupled)
 
 
 def open_scalars(value: Any) -> Iterator[Scalar]:

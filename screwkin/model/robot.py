@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
-from screwkin.algebra.scalar import Scalar, is_symbolic
+from screwkin.algebra.scalar import Scalar, is_symbolic, structural
 from screwkin.algebra.se3 import IDENTITY, Pose
 from screwkin.errors import InputError, UnknownNameError, expect, one_of
 from screwkin.model.changes import changed_text, check_followed
+from screwkin.model.coupled import coupling_text
 from screwkin.model.display import figure, html_table, listing
 from screwkin.model.inertias import impossible
 from screwkin.model.reading import read_table
@@ -19,6 +20,7 @@ from screwkin.model.record_faults import check_records, vars_of
 from screwkin.model.records import (
     Box,
     Closure,
+    CoupledJoint,
     Inertia,
     Joint,
     JointType,
@@ -36,6 +38,7 @@ from screwkin.model.toml_out import robot_toml
 __all__ = [
     "Box",
     "Closure",
+    "CoupledJoint",
     "Inertia",
     "Joint",
     "JointType",
@@ -46,6 +49,7 @@ __all__ = [
     "Robot",
     "Sole",
     "refuse_closures",
+    "refuse_coupled",
     "robot_text",
 ]
 
@@ -148,11 +152,13 @@ class Robot(RobotRecord):
     def __repr__(self) -> str:
         limbs = [f"{limb.name} ({len(self.path_to(limb.link))} joints to {limb.tip})" for limb in self.limbs]
         closures = [f"  closures: {listing(c.name for c in self.closures)}"] if self.closures else []
+        coupled = [f"  coupled: {listing(map(coupling_text, self.coupled))}"] if self.coupled else []
         return "\n".join(
             [
                 f"Robot {self.name!r}: {self.base} base {self.base_link!r}, {len(self.links)} links, "
                 f"{len(self.joints)} joints, {figure(self.mass)} kg",
                 f"  joints: {listing(self.joint_names)}",
+                *coupled,
                 f"  limbs: {listing(limbs)}",
                 *closures,
             ]
@@ -169,9 +175,13 @@ class Robot(RobotRecord):
                 *(", ".join(map(figure, v)) for v in (joint.screw.s, joint.screw.s0)),
                 *map(figure, (joint.screw.pitch, joint.lower, joint.upper)),
             ]
-            for joint in self.joints
+            for joint in self.tree
         ]
         head = ["joint", "parent", "child", "type", "s", "s0 [m]", "pitch [m/rad]", "lower", "upper"]
+        if self.coupled:
+            head.append("coupled")
+            texts = [""] * len(self.joints) + [coupling_text(joint) for joint in self.coupled]
+            rows = [[*row, text] for row, text in zip(rows, texts, strict=True)]
         return html_table(repr(self).splitlines()[0], head, rows)
 
     @cached_property
@@ -185,6 +195,12 @@ class Robot(RobotRecord):
         return tuple(joint.name for joint in self.joints)
 
     @cached_property
+    def gears(self) -> tuple[tuple[int, Scalar], ...]:
+        """For every joint of ``tree``, the index in q of what drives it, and the ratio of their rates."""
+        own = [(i, 1) for i in range(len(self.joints))]
+        return (*own, *((self.joint_names.index(c.leader), structural(c.ratio)) for c in self.coupled))
+
+    @cached_property
     def tip_names(self) -> tuple[str, ...]:
         """Names of the limbs' tips, in the order of limbs."""
         return tuple(limb.tip for limb in self.limbs)
@@ -196,28 +212,31 @@ class Robot(RobotRecord):
 
     @cached_property
     def joint_above(self) -> Mapping[str, int]:
-        """For every link but the base: the index of the joint that carries it."""
-        return {joint.child: i for i, joint in enumerate(self.joints)}
+        """For every link but the base: the index in ``tree`` of the joint that carries it."""
+        return {joint.child: i for i, joint in enumerate(self.tree)}
 
     @cached_property
     def traversal(self) -> tuple[int, ...]:
-        """Joint indices ordered so that every parent comes before its children."""
+        """Indices in ``tree``, ordered so that every parent comes before its children."""
         order: list[int] = []
-        reached, left = {self.base_link}, list(range(len(self.joints)))
+        reached, left = {self.base_link}, list(range(len(self.tree)))
         while left:
-            ready = [i for i in left if self.joints[i].parent in reached]
+            ready = [i for i in left if self.tree[i].parent in reached]
             order += ready
-            reached |= {self.joints[i].child for i in ready}
+            reached |= {self.tree[i].child for i in ready}
             left = [i for i in left if i not in ready]
         return tuple(order)
 
     def path_to(self, link: str) -> tuple[int, ...]:
-        """Indices of the joints from the base to a link, in that order; none for the base link."""
+        """Indices in ``tree`` of the joints from the base to a link, in that order; none for the base link.
+
+        Those of ``len(joints)`` and above are coupled joints, which have no place in q.
+        """
         path: list[int] = []
         while link != self.base_link:
             i = self.joint_above[link]
             path.append(i)
-            link = self.joints[i].parent
+            link = self.tree[i].parent
         return tuple(reversed(path))
 
     def link(self, name: str) -> Link:
@@ -225,8 +244,8 @@ class Robot(RobotRecord):
         return _named(self.links, name, "link")
 
     def joint(self, name: str) -> Joint:
-        """The joint of that name; UnknownNameError lists the valid ones."""
-        return _named(self.joints, name, "joint")
+        """The joint of that name, coupled or not; UnknownNameError lists the valid ones."""
+        return _named(self.tree, name, "joint")
 
     def limb(self, name: str) -> Limb:
         """The limb of that name, or the limb whose tip has that name; UnknownNameError lists the limbs."""
@@ -293,6 +312,26 @@ def robot_text(robot: Robot) -> str:
         InputError: the robot holds symbols that its own text does not explain.
     """
     return robot.text if robot.text_matches else robot_toml(robot)
+
+
+def refuse_coupled(robot: Robot, joints: Iterable[int], what: str, instead: str) -> None:
+    """Refuse coupled joints where every joint is expected to have a coordinate of its own.
+
+    Args:
+        robot: any robot.
+        joints: indices in ``robot.tree``.
+        what: the function, such as ``"limb_ik"``.
+        instead: what to do instead, such as ``"use close_loops"``.
+
+    Raises:
+        InputError: coupled joints are among them.
+    """
+    names = [coupling_text(robot.coupled[i - len(robot.joints)]) for i in joints if i >= len(robot.joints)]
+    if names:
+        raise InputError(
+            f"{robot.name} has coupled joints here ({', '.join(names)}), and {what} takes every joint as "
+            f"free; {instead}"
+        )
 
 
 def refuse_closures(robot: Robot, what: str, instead: str) -> None:

@@ -104,6 +104,14 @@ class LinkRow(Row):
     shapes: list[ShapeRow] = Field([], description='[{ role = "visual", mesh = "foot.stl", frame = {...} }]')
 
 
+class MimicRow(Row):
+    """A coupling: position = ratio * that of another joint + offset."""
+
+    joint: Name = Field(description="name of the joint that it follows")
+    ratio: Value = Field(1.0, description="its rate per unit rate of that joint")
+    offset: Value = Field(0.0, description="its position where that joint is at 0, in rad or m")
+
+
 class JointRow(Row):
     """[[joint]]: a screw. Limits left out are no limits."""
 
@@ -118,6 +126,7 @@ class JointRow(Row):
     upper: Value = Field(math.inf, description="upper limit in rad or m")
     velocity: Positive = Field(math.inf, description="greatest speed in rad/s or m/s")
     effort: Positive = Field(math.inf, description="greatest torque or force in N m or N")
+    mimic: MimicRow | None = Field(None, description='{ joint = "leader", ratio = 1.0, offset = 0.0 }')
 
 
 class ClosureRow(Row):
@@ -184,6 +193,7 @@ _PARTS: Mapping[str, type[Row]] = {
     "frame_b": FrameRow,
     "boxes": BoxRow,
     "shapes": ShapeRow,
+    "mimic": MimicRow,
 }
 
 Kind = TypeVar("Kind", bound=Row)

@@ -13,6 +13,7 @@ import numpy as np
 
 from screwkin.algebra.se3 import Pose, Vector
 from screwkin.model.checks import sole_faults
+from screwkin.model.coupled import tightened
 from screwkin.model.records import Inertia, Joint, RobotRecord, Shape, ShapeRole
 from screwkin.model.structure import RESERVED
 from screwkin.model.values import COUPLINGS, NAME, UNIT_TOLERANCE
@@ -30,13 +31,13 @@ def certified(robot: RobotRecord) -> bool:
 
 
 def _names_certified(robot: RobotRecord) -> bool:
-    links, joints, limbs = robot.links, robot.joints, robot.limbs
+    links, joints, limbs = robot.links, robot.tree, robot.limbs
     inner: list[Any] = [rows for link in links for rows in (link.boxes, link.shapes)]
     inner += [sole.corners for sole in robot.soles]
-    inner += [posture.q for posture in robot.postures]
+    inner += [robot.postures, *(posture.q for posture in robot.postures)]
     if not all(
         isinstance(rows, tuple)
-        for rows in (links, joints, robot.closures, limbs, robot.soles, robot.postures, *inner)
+        for rows in (links, robot.joints, robot.coupled, robot.closures, limbs, robot.soles, *inner)
     ):
         return False
     for rows in (links, joints, robot.closures, limbs, robot.postures):
@@ -59,7 +60,8 @@ def _names_certified(robot: RobotRecord) -> bool:
         and all(limb.chain and len({*limb.chain} & {*COUPLINGS}) == len(limb.chain) for limb in limbs)
         and soled <= legs
         and len(soled) == len(robot.soles)
-        and all(len(posture.q) == len(joints) for posture in robot.postures)
+        and all(len(posture.q) == len(robot.joints) for posture in robot.postures)
+        and {one.leader for one in robot.coupled} <= {joint.name for joint in robot.joints}
     )
 
 
@@ -73,7 +75,8 @@ def _is_tree(base: str, links: set[str], joints: Sequence[Joint]) -> bool:
 
 
 def _numbers_certified(robot: RobotRecord) -> bool:
-    joints, limbs, closures = robot.joints, robot.limbs, robot.closures
+    joints, limbs, closures = robot.tree, robot.limbs, robot.closures
+    free = [tightened(joint, robot.coupled) for joint in robot.joints]
     frames = [link.frame for link in robot.links] + [limb.frame for limb in limbs]
     frames += [] if robot.waist is None else [robot.waist]
     frames += [frame for closure in closures for frame in (closure.frame_a, closure.frame_b)]
@@ -96,10 +99,12 @@ def _numbers_certified(robot: RobotRecord) -> bool:
         and bool(np.isfinite(_moments([link.inertia for link in robot.links])).all())
         and all(_is_joint(joint) for joint in joints)
         and not any(True for sole in robot.soles for _ in sole_faults(sole))
+        and all(math.isfinite(one.ratio) and math.isfinite(one.offset) for one in robot.coupled)
+        and all(joint.lower <= joint.upper for joint in free)
         and all(
             joint.lower <= x <= joint.upper
             for posture in robot.postures
-            for joint, x in zip(joints, posture.q, strict=True)
+            for joint, x in zip(free, posture.q, strict=True)
         )
         and all(math.isfinite(posture.base_height) for posture in robot.postures)
     )

@@ -16,7 +16,7 @@ from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.se3 import IDENTITY, UNTURNED, ZERO, Pose, Rotation, Vector, leaves
 from screwkin.errors import InputError
 from screwkin.model.mesh_files import short_path
-from screwkin.model.records import Joint, Limb, Link, Posture, RobotRecord, Shape, open_scalars
+from screwkin.model.records import CoupledJoint, Joint, Limb, Link, Posture, RobotRecord, Shape, open_scalars
 from screwkin.model.values import COUPLINGS
 
 _UNLIMITED = {"lower": -math.inf, "upper": math.inf, "velocity": math.inf, "effort": math.inf}
@@ -47,11 +47,11 @@ def table_data(robot: RobotRecord, folder: Path | None = None) -> dict[str, Any]
         "base_link": robot.base_link,
         "base": robot.base,
     }
-    origins = {joint.child: joint.screw.s0 for joint in robot.joints}
+    origins = {joint.child: joint.screw.s0 for joint in robot.tree}
     data: dict[str, Any] = {
         "robot": {key: value for key, value in head.items() if value},
         "link": [_link(link, origins.get(link.name, ZERO), folder) for link in robot.links],
-        "joint": [_joint(joint) for joint in robot.joints],
+        "joint": [_joint(joint) for joint in robot.tree],
         "closure": [_row(closure) for closure in robot.closures],
         "limb": [_limb(limb) for limb in robot.limbs],
         "sole": [_row(sole) for sole in robot.soles],
@@ -132,7 +132,7 @@ def _shape(shape: Shape, folder: Path | None) -> dict[str, Any]:
 
 def _joint(joint: Joint) -> dict[str, Any]:
     screw = joint.screw
-    row = {
+    row: dict[str, Any] = {
         "name": joint.name,
         "parent": joint.parent,
         "child": joint.child,
@@ -143,7 +143,10 @@ def _joint(joint: Joint) -> dict[str, Any]:
     if joint.type == "helical" or (joint.type == "revolute" and screw.pitch != 0):
         row["pitch"] = screw.pitch
     limits = {key: getattr(joint, key) for key in _UNLIMITED}
-    return {**row, **{key: x for key, x in limits.items() if x != _UNLIMITED[key]}}
+    row |= {key: x for key, x in limits.items() if x != _UNLIMITED[key]}
+    if isinstance(joint, CoupledJoint):
+        row["mimic"] = {"joint": joint.leader, "ratio": joint.ratio, "offset": joint.offset}
+    return row
 
 
 def _limb(limb: Limb) -> dict[str, Any]:

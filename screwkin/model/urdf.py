@@ -35,7 +35,7 @@ from screwkin.model.inertias import (
     is_flat,
     principal_axes,
 )
-from screwkin.model.records import Box, Inertia, Joint, Link
+from screwkin.model.records import Box, CoupledJoint, Inertia, Joint, Link
 from screwkin.model.robot import Robot
 from screwkin.model.toml_out import rpy_of
 from screwkin.model.urdf_shapes import add_geometry
@@ -56,7 +56,7 @@ def urdf_frames(robot: Robot) -> Mapping[str, Pose]:
     """
     frames = {robot.base_link: Pose(UNTURNED, ZERO)}
     own = {link.name: link.frame for link in robot.links}
-    for joint in robot.joints:
+    for joint in robot.tree:
         frame, screw = own[joint.child], joint.screw
         if joint.type != "prismatic":
             along = dot(screw.s, frame.p - screw.s0)
@@ -90,7 +90,7 @@ def link_colours(robot: Robot) -> Mapping[str, Colour]:
     """White base; outwards along a limb, bodies with boxes or shapes alternate between slate and orange."""
     depth = {robot.base_link: 0}
     for i in robot.traversal:
-        joint = robot.joints[i]
+        joint = robot.tree[i]
         link = robot.link(joint.child)
         depth[joint.child] = depth[joint.parent] + bool(link.boxes or link.shapes)
     colours = {name: (SLATE if level % 2 else ORANGE) for name, level in depth.items()}
@@ -145,8 +145,9 @@ def _document(
         ElementTree.SubElement(material, "color", rgba=" ".join(map(repr, colour)))
     for link in links:
         _add_link(root, link, frames[link.name], palette[colours[link.name]], folder)
-    for joint in robot.joints:
-        _add_joint(root, joint, frames)
+    endless = _endless(robot)
+    for joint in robot.tree:
+        _add_joint(root, joint, frames, joint.name in endless)
     for name, (body, pose) in fixed.items():
         _add_frame(root, name, body, frames[body].inverse @ pose)
     ElementTree.indent(root)
@@ -167,7 +168,7 @@ def _mujoco_options(robot: Robot) -> dict[str, str]:
 
 
 def _refuse_what_urdf_cannot_say(robot: Robot) -> None:
-    helical = [joint.name for joint in robot.joints if joint.type == "helical"]
+    helical = [joint.name for joint in robot.tree if joint.type == "helical"]
     if helical:
         raise InputError(f"robot {robot.name}: URDF has no helical joints, but it has {', '.join(helical)}")
     loops = [closure.name for closure in robot.closures]
@@ -231,19 +232,32 @@ def _add_box(element: ElementTree.Element, kind: str, box: Box, back: Pose) -> E
     return shape
 
 
-def _add_joint(root: ElementTree.Element, joint: Joint, frames: Mapping[str, Pose]) -> None:
-    unlimited = math.isinf(joint.lower) and math.isinf(joint.upper) and joint.type == "revolute"
-    kind = "continuous" if unlimited else joint.type
+def _endless(robot: Robot) -> set[str]:
+    """Revolute joints without limits, unless coupled to one with limits: some readers want one kind."""
+    leader = {joint.name: joint.leader for joint in robot.coupled}
+    ending = {
+        leader.get(joint.name, joint.name)
+        for joint in robot.tree
+        if joint.type != "revolute" or math.isfinite(joint.lower) or math.isfinite(joint.upper)
+    }
+    return {joint.name for joint in robot.tree if leader.get(joint.name, joint.name) not in ending}
+
+
+def _add_joint(root: ElementTree.Element, joint: Joint, frames: Mapping[str, Pose], endless: bool) -> None:
+    kind = "continuous" if endless else joint.type
     child = frames[joint.child]
     element = _add_connection(
         root, joint.name, kind, joint.parent, joint.child, frames[joint.parent].inverse @ child
     )
     ElementTree.SubElement(element, "axis", xyz=_triple(child.inverse.R @ joint.screw.s))
     limits = {"velocity": joint.velocity, "effort": joint.effort}
-    if not unlimited:
+    if not endless:
         limits = {"lower": joint.lower, "upper": joint.upper, **limits}
     finite = {name: max(-_UNLIMITED, min(value, _UNLIMITED)) for name, value in limits.items()}
     ElementTree.SubElement(element, "limit", {name: _number(value) for name, value in finite.items()})
+    if isinstance(joint, CoupledJoint):
+        numbers = {"multiplier": _number(joint.ratio), "offset": _number(joint.offset)}
+        ElementTree.SubElement(element, "mimic", {"joint": joint.leader, **numbers})
 
 
 def _add_frame(root: ElementTree.Element, name: str, link: str, place: Pose) -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +19,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.screws import INFINITE, Screw
 from screwkin.algebra.se3 import IDENTITY, Pose, as_array, vector_from_array
 from screwkin.errors import TableError
+from screwkin.model.coupled import coupled_joint, coupling_text, tightened
 from screwkin.model.inertias import (
     impossible,
     inertia_from_matrix,
@@ -26,16 +27,16 @@ from screwkin.model.inertias import (
     nearest_body,
     without_noise,
 )
-from screwkin.model.records import Box, Inertia, Joint, Link, RobotRecord, Shape
+from screwkin.model.records import Box, CoupledJoint, Inertia, Joint, Link, RobotRecord, Shape
 from screwkin.model.robot import Robot
 from screwkin.model.toml import read_text
 from screwkin.model.toml_out import robot_toml
+from screwkin.model.urdf_joints import Mimic, couplings_of, decomposed, free_root
 from screwkin.model.urdf_shapes import shape_reader
 from screwkin.model.urdf_xml import (
     TYPES,
     Edge,
     Element,
-    Mimic,
     Reader,
     base_of,
     from_root,
@@ -62,7 +63,7 @@ class UrdfRobot:
     remarks: tuple[str, ...]
 
 
-def load_urdf(path: str | Path, repair: bool = False, mimic: Mimic = "refuse") -> UrdfRobot:
+def load_urdf(path: str | Path, repair: bool = False, mimic: Mimic = "couple") -> UrdfRobot:
     """The robot of a URDF file, with remarks on what a table cannot hold.
 
     Args:
@@ -76,7 +77,7 @@ def load_urdf(path: str | Path, repair: bool = False, mimic: Mimic = "refuse") -
     return parse_urdf(read_text(Path(path), TableError), str(path), repair, mimic)
 
 
-def parse_urdf(text: str, path: str = "<text>", repair: bool = False, mimic: Mimic = "refuse") -> UrdfRobot:
+def parse_urdf(text: str, path: str = "<text>", repair: bool = False, mimic: Mimic = "couple") -> UrdfRobot:
     """The robot of a URDF text; its base is fixed if the root link is called ``world``, else floating.
 
     Args:
@@ -84,8 +85,8 @@ def parse_urdf(text: str, path: str = "<text>", repair: bool = False, mimic: Mim
         path: where it comes from, for messages and for ``Robot.path``.
         repair: replace inertias that break the triangle inequality by the nearest that keep it, and say so
             in the table's ``source``; else they stay as they stand, with a remark.
-        mimic: ``refuse`` coupled joints, which tables have no word for, or read them as ``free`` joints of
-            their own, with their coupling as a remark.
+        mimic: ``couple`` joints that follow others, or read them as ``free`` joints of their own, with their
+            coupling as a remark.
 
     Raises:
         TableError: the text has faults; it lists all of them.
@@ -93,11 +94,19 @@ def parse_urdf(text: str, path: str = "<text>", repair: bool = False, mimic: Mim
     root = read_root(text, path)
     reader = Reader()
     links = dict(named(reader, root, "link"))
-    joints = list(read_joints(reader, root, links, mimic))
+    joints = list(read_joints(reader, root, links))
     base = base_of(reader, links, joints)
     if reader.faults:
         raise TableError(path, reader.faults)
     _note_left_out(reader, root, joints)
+    joints, couplings = couplings_of(reader, joints, mimic)
+    free = free_root(links, joints, base)
+    if free is not None:
+        reader.note("floating joint at the root, read as the floating base", free.name)
+        joints.remove(free)
+        del links[base]
+        base = free.child
+    links, joints = decomposed(reader, links, joints)
     names, shapes = _unique_names(reader, links), shape_reader(reader, root, Path(path).parent)
     bodies = _bodies(base, joints, names)
     for name, element in links.items():
@@ -107,6 +116,12 @@ def parse_urdf(text: str, path: str = "<text>", repair: bool = False, mimic: Mim
         bodies[name].shapes += others
     moving = [edge for edge in joints if edge.type != "fixed"]
     rows = [_joint(reader, edge, bodies[edge.parent], bodies[edge.child]) for edge in moving]
+    leaders = [row for edge, row in zip(moving, rows, strict=True) if edge.name not in couplings]
+    followers = [
+        coupled_joint(row, (_name(couplings[edge.name][0]), *couplings[edge.name][1:]))
+        for edge, row in zip(moving, rows, strict=True)
+        if edge.name in couplings
+    ]
     whole = list({id(bodies[name]): bodies[name] for name in links}.values())
     parts = [_link(body) for body in whole]
     _audit_bodies(reader, whole, parts, base, names)
@@ -115,10 +130,11 @@ def parse_urdf(text: str, path: str = "<text>", repair: bool = False, mimic: Mim
         name=_name(root.get("name", "") or "robot"),
         description="",
         source=f"URDF {Path(path).name}{repaired}",
-        base="fixed" if base == "world" else "floating",
+        base="fixed" if base == "world" and free is None else "floating",
         base_link=names[base],
         links=tuple(parts),
-        joints=tuple(rows),
+        joints=tuple(leaders),
+        coupled=_within_reach(reader, leaders, followers),
     )
     if reader.faults:
         raise TableError(path, reader.faults)
@@ -255,6 +271,21 @@ def _joint(reader: Reader, edge: Edge, parent: _Body, child: _Body) -> Joint:
         INFINITE if kind == "prismatic" else 0,
     )
     return Joint(_name(edge.name), parent.name, child.name, kind, screw, lower, upper, *greatest)
+
+
+def _within_reach(
+    reader: Reader, leaders: Sequence[Joint], followers: Sequence[CoupledJoint]
+) -> tuple[CoupledJoint, ...]:
+    """The coupled joints, without limits where these would keep a leader that can move from moving."""
+    free = list(followers)
+    for leader in leaders:
+        together = tightened(leader, free)
+        if leader.lower < leader.upper and together.lower >= together.upper:
+            own = [one for one in free if one.leader == leader.name]
+            text = "limits of coupled joints that would hold their leader, left out"
+            reader.note(text, ", ".join(map(coupling_text, own)))
+            free = [replace(one, lower=-math.inf, upper=math.inf) if one in own else one for one in free]
+    return tuple(free)
 
 
 def _row(edge: Edge) -> str:

@@ -7,7 +7,7 @@ import re
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, get_args
+from typing import Any
 
 from screwkin.algebra.scalar import structural
 from screwkin.algebra.se3 import Pose, Vector, X, Y, Z, rotate
@@ -15,9 +15,6 @@ from screwkin.errors import Fault, TableError
 from screwkin.model.records import JointType
 
 Element = Any
-Mimic = Literal["refuse", "free"]
-"""What becomes of joints that follow others."""
-MIMICS: tuple[Mimic, ...] = get_args(Mimic)
 
 _DECLARATION = re.compile(r"<\?xml\s[^<>]*\?>")
 _FIX = "Give a URDF file: XML with <robot> around <link> and <joint>"
@@ -28,7 +25,8 @@ _FOREIGN: Mapping[str, str] = {
 _XACRO = "Run xacro first: xacro FILE.xacro > FILE.urdf (of ROS; or: python -m pip install xacro)"
 
 TYPES: Mapping[str, JointType] = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic"}
-"""Joints of URDF that move, and what they are called here."""
+"""Joints of URDF that move by one coordinate, and what they are called here."""
+_KINDS = (*TYPES, "fixed", "floating", "planar")
 
 
 @dataclass
@@ -148,15 +146,12 @@ class Edge:
     element: Element
 
 
-def read_joints(reader: Reader, root: Element, links: Mapping[str, Element], mimic: Mimic) -> Iterator[Edge]:
+def read_joints(reader: Reader, root: Element, links: Mapping[str, Element]) -> Iterator[Edge]:
     """The joints, with all their faults."""
-    known = {element.get("name", "") for element in root.findall("joint")}
     for name, element in named(reader, root, "joint"):
         row, kind = f"<joint> {name!r}", element.get("type", "")
-        if kind not in (*TYPES, "fixed"):
-            reader.fault(row, "type", f"is {kind!r}", f"Supported: {', '.join((*TYPES, 'fixed'))}")
-        if kind != "fixed" and element.find("mimic") is not None:
-            _read_mimic(reader, name, element.find("mimic"), known, mimic)
+        if kind not in _KINDS:
+            reader.fault(row, "type", f"is {kind!r}", f"Supported: {', '.join(_KINDS)}")
         ends = []
         for key in ("parent", "child"):
             end = element.find(key)
@@ -165,24 +160,8 @@ def read_joints(reader: Reader, root: Element, links: Mapping[str, Element], mim
                 found = f"there is no link {link!r}" if link else "is missing"
                 reader.fault(row, key, found, f"Write <{key} link=...> with a link of the file")
             ends.append(link)
-        axis = X if kind == "fixed" else _axis(reader, row, element)
+        axis = X if kind in ("fixed", "floating") else _axis(reader, row, element)
         yield Edge(name, kind, ends[0], ends[1], reader.origin(row, element), axis, element)
-
-
-def _read_mimic(reader: Reader, name: str, element: Element, known: set[str], mimic: Mimic) -> None:
-    """A coupling to another joint: a fault, or a remark that says it."""
-    row, leader = f"<joint> {name!r}", element.get("joint", "")
-    (factor,) = reader.numbers(row, element, "multiplier", (1.0,))
-    (offset,) = reader.numbers(row, element, "offset", (0.0,))
-    coupling = f"{name} = {factor:g} {leader} {offset + 0.0:+g}"
-    if leader not in known and mimic == "refuse":
-        reader.fault(row, "mimic", f"there is no joint {leader!r}", "Name a joint of the file")
-    elif mimic == "refuse":
-        found = f"couples two joints, {coupling}, which tables cannot say"
-        fix = "Read it as a joint of its own, and keep the coupling where it is driven: convert --mimic free"
-        reader.fault(row, "mimic", found, fix)
-    else:
-        reader.note("coupled in the file, here joints of their own: drive them so", coupling)
 
 
 def _axis(reader: Reader, row: str, element: Element) -> Vector:

@@ -57,7 +57,7 @@ def frames_drawn(account: Account) -> Figure:
     reach = max(np.abs(outline[:, 0]).max() for frame in outlines for _, _, outline in frame)
     top = max(outline[:, 1].max() for frame in outlines for _, _, outline in frame)
     of_joint = joint_colours(account, GREY)
-    colours = {robot.base_link: GREY} | {j.child: of_joint[j.name] for j in robot.joints}
+    colours = {robot.base_link: GREY} | {j.child: of_joint.get(j.name, GREY) for j in robot.tree}
     for one, i, frame in zip(axes.flat, samples, outlines, strict=True):
         _draw(one, frame, colours)
         one.set_xlim(-1.1 * reach, 1.1 * reach)
@@ -117,7 +117,7 @@ def _lines(robot: Robot, name: str) -> list[Array]:
     """Ends (2, 3) of the lines from a link's joint to the joints and tips that it carries."""
     if name not in robot.joint_above:
         return []
-    start = as_array(robot.joints[robot.joint_above[name]].screw.s0)
-    ends = [as_array(joint.screw.s0) for joint in robot.joints if joint.parent == name]
+    start = as_array(robot.tree[robot.joint_above[name]].screw.s0)
+    ends = [as_array(joint.screw.s0) for joint in robot.tree if joint.parent == name]
     ends += [as_array(limb.frame.p) for limb in robot.limbs if limb.link == name]
     return [np.stack([start, end]) for end in ends if np.linalg.norm(end - start) > 1e-6]

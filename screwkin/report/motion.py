@@ -92,7 +92,7 @@ HUES = ("#222222", "#56B4E9", "#CC79A7", "#009E73", "#E69F00", "#0072B2")
 
 def joints_shown(robot: Robot, limb: Limb) -> list[tuple[int, str, str]]:
     """Index, name without the limb's side, and colour of every joint of a limb."""
-    path = robot.path_to(limb.link)
+    path = [i for i in robot.path_to(limb.link) if i < len(robot.joints)]
     common = len(common_prefix([robot.joint_names[i] for i in path]))
     return [(i, shown(robot.joint_names[i][common:]), HUES[k % len(HUES)]) for k, i in enumerate(path)]
 

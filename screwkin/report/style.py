@@ -126,7 +126,7 @@ def limb_colours(account: Account) -> dict[str, str]:
 def joint_colours(account: Account, others: str = PLAIN) -> dict[str, str]:
     """Colour of every joint: its limb's."""
     robot, of_limb = account.robot, limb_colours(account)
-    own = {robot.joint_names[i]: of_limb[limb.name] for limb in robot.limbs for i in robot.path_to(limb.link)}
+    own = {robot.tree[i].name: of_limb[limb.name] for limb in robot.limbs for i in robot.path_to(limb.link)}
     return {**dict.fromkeys(robot.joint_names, others), **own}
 
 

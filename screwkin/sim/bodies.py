@@ -80,7 +80,7 @@ def bodies_of(robot: Robot) -> tuple[tuple[Body, ...], tuple[str, ...]]:
     frames = {name: as_array(robot.frame(name)[1]) for name in robot.link_names}
     bodies = [Body(floored.get(robot.base_link, robot.link(robot.base_link)), None, (), np.eye(4))]
     above: dict[str, tuple[str, tuple[Joint, ...]]] = {}
-    for joint in (robot.joints[i] for i in robot.traversal):
+    for joint in (robot.tree[i] for i in robot.traversal):
         parent, joints = above.get(joint.parent, (joint.parent, ()))
         if joint.child in merged:
             above[joint.child] = (parent, (*joints, joint))
@@ -92,7 +92,7 @@ def bodies_of(robot: Robot) -> tuple[tuple[Body, ...], tuple[str, ...]]:
 
 def _is_bracket(robot: Robot, name: str) -> bool:
     """Whether a link is but a place between two joints, with nothing of its own."""
-    link, below = robot.link(name), [joint for joint in robot.joints if joint.parent == name]
+    link, below = robot.link(name), [joint for joint in robot.tree if joint.parent == name]
     held = {limb.link for limb in robot.limbs} | {
         end for closure in robot.closures for end in (closure.link_a, closure.link_b)
     }

@@ -21,14 +21,14 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array
 from screwkin.errors import InputError, needed_for
+from screwkin.kinematics.positions import tree_positions
 from screwkin.model.robot import Joint, Robot
 from screwkin.model.state import State
 from screwkin.sim.backend import Command, Contact, Observation, moment_about_origin
 from screwkin.sim.bodies import Body, bodies_of
+from screwkin.sim.couplings import STIFFEST, couple_in_mujoco
 from screwkin.sim.drive import UNLIMITED, RigidServos, Servos
 
-STIFFEST = 0.9999
-"""Largest impedance of a constraint that MuJoCo takes: the share of it that is not regularised away."""
 CORNER = 1e-4
 """Radius [m] of the spheres that stand for the corners of a sole that no box has."""
 
@@ -95,8 +95,10 @@ class MuJoCoBackend:
         spec = _world(mj, self._physics)
         _add_bodies(mj, spec, robot, bodies, self._servos.rotor_inertia)
         _add_closures(mj, spec, robot, bodies)
+        couple_in_mujoco(mj, spec, robot)
         self.model = spec.compile()
         self.data = mj.MjData(self.model)
+        self._tree = np.array([self.model.joint(joint.name).qposadr[0] for joint in robot.tree], dtype=int)
         joints = [self.model.joint(name) for name in robot.joint_names]
         self._qpos = np.array([joint.qposadr[0] for joint in joints], dtype=int)
         self._dof = np.array([joint.dofadr[0] for joint in joints], dtype=int)
@@ -124,7 +126,7 @@ class MuJoCoBackend:
             self.model.body_pos[self._base], self.model.body_quat[self._base] = T[:3, 3], quat
         else:
             self.data.qpos[:3], self.data.qpos[3:7] = T[:3, 3], quat
-        self.data.qpos[self._qpos] = q
+        self.data.qpos[self._tree] = tree_positions(self._robot, q.tolist())
         self._servos.reset(q)
         mj.mj_kinematics(self.model, self.data)
         self._steps, self._began = 0, time.monotonic()
@@ -259,7 +261,7 @@ def _add_bodies(mj: Any, spec: Any, robot: Robot, bodies: tuple[Body, ...], roto
         if body.parent is None and robot.base == "floating":
             element.add_freejoint(name="floating base")
         for joint in body.joints:
-            _add_joint(mj, element, body, joint, rotor[joint.name])
+            _add_joint(mj, element, body, joint, rotor.get(joint.name, 0.0))
         for size, center in [(as_array(box.size), body.point(box.center)) for box in body.link.boxes]:
             element.add_geom(
                 type=mj.mjtGeom.mjGEOM_BOX,
@@ -338,7 +340,7 @@ def _quat(mj: Any, T: Array) -> Array:
 
 
 def _check_joints(robot: Robot) -> None:
-    helical = [joint.name for joint in robot.joints if joint.type == "helical"]
+    helical = [joint.name for joint in robot.tree if joint.type == "helical"]
     if helical:
         raise InputError(f"robot {robot.name}: MuJoCo has no helical joints, but it has {', '.join(helical)}")
     soles = {sole.limb for sole in robot.soles}

@@ -26,11 +26,13 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array
 from screwkin.errors import InputError, MissingDependencyError
+from screwkin.kinematics.positions import tree_positions
 from screwkin.model.robot import Limb, Robot
 from screwkin.model.state import State
 from screwkin.model.urdf import urdf_frames, urdf_of_bodies
 from screwkin.sim.backend import Command, Contact, Observation, moment_about_origin
 from screwkin.sim.camera import Camera
+from screwkin.sim.couplings import couple_in_pybullet
 from screwkin.sim.drive import UNLIMITED, RigidServos, Servos
 from screwkin.sim.motors import MotorServos
 from screwkin.sim.rotors import RelativeRotors, with_rotors
@@ -109,12 +111,15 @@ class PyBulletBackend:
         self._link_names = [robot.base_link, *(info[12].decode() for info in self._joint_infos())]
         names = [info[1].decode() for info in self._joint_infos()]
         self._joints = [names.index(name) for name in robot.joint_names]
-        self._applied = np.zeros(len(names))
+        self._tree = [names.index(joint.name) for joint in robot.tree]
+        self._applied = np.zeros(len(self._joints))
         self._release()
+        couple_in_pybullet(self._p, self._here, self._body, robot, self._tree)
         self._rotors: RelativeRotors | None = None
         if not steadied:
             floats = robot.base == "floating"
-            self._rotors = RelativeRotors(self._p, self._here, self._body, self._joints, rotors, floats)
+            every = np.append(rotors, np.zeros(len(robot.coupled)))
+            self._rotors = RelativeRotors(self._p, self._here, self._body, self._tree, every, floats)
         info = self._p.getDynamicsInfo(self._body, -1, **self._here)
         self._T_base_inertial = self._pose(info[3], info[4])
         self._T_inertial_base = np.linalg.inv(self._T_base_inertial)
@@ -159,7 +164,7 @@ class PyBulletBackend:
     def _release(self) -> None:
         """Remove all that PyBullet adds by itself: damping of links and joints, and braking motors."""
         p, here = self._p, self._here
-        for link in range(-1, len(self._joints)):
+        for link in range(-1, len(self._tree)):
             p.changeDynamics(
                 self._body,
                 link,
@@ -171,7 +176,7 @@ class PyBulletBackend:
                 **here,
             )
         p.setJointMotorControlArray(
-            self._body, self._joints, p.VELOCITY_CONTROL, forces=[0.0] * len(self._joints), **here
+            self._body, self._tree, p.VELOCITY_CONTROL, forces=[0.0] * len(self._tree), **here
         )
 
     def _soften_soles(self) -> None:
@@ -193,7 +198,7 @@ class PyBulletBackend:
         index = self._link_names.index(limb.link) - 1
         p.enableJointForceTorqueSensor(self._body, index, True, **self._here)
         info = p.getDynamicsInfo(self._body, index, **self._here)
-        joint = robot.joints[robot.joint_above[limb.link]]
+        joint = robot.tree[robot.joint_above[limb.link]]
         back = urdf_frames(robot)[limb.link].inverse
         R_inertial_link = self._pose((0.0, 0.0, 0.0), info[4])[:3, :3].T
         return _Foot(
@@ -215,7 +220,8 @@ class PyBulletBackend:
         T = np.asarray(state.T_world_base, dtype=float) @ self._T_base_inertial
         p.resetBasePositionAndOrientation(self._body, T[:3, 3].tolist(), _quat_xyzw(T[:3, :3]), **here)
         p.resetBaseVelocity(self._body, [0.0] * 3, [0.0] * 3, **here)
-        for index, q in zip(self._joints, np.asarray(state.q, dtype=float).tolist(), strict=True):
+        positions = tree_positions(self._robot, np.asarray(state.q, dtype=float).tolist())
+        for index, q in zip(self._tree, positions, strict=True):
             p.resetJointState(self._body, index, q, 0.0, **here)
         self._servos.reset(np.array(state.q, dtype=float))
         self._applied = np.zeros(len(self._joints))
@@ -255,7 +261,8 @@ class PyBulletBackend:
                 self._body, self._joints, p.TORQUE_CONTROL, forces=action.torque.tolist(), **here
             )
         if self._rotors is not None:
-            self._rotors.correct(action.torque, self.dt)
+            torque = np.append(action.torque, np.zeros(len(self._robot.coupled)))
+            self._rotors.correct(torque, self.dt)
 
     def _show(self, began: float) -> None:
         """Keep a window's camera on the robot, and its time no faster than the world's."""

@@ -156,7 +156,7 @@ class _World:
 def _neighbours(robot: Robot) -> set[frozenset[str]]:
     """Pairs of links with nothing but links without boxes between them, and pairs that a closure joins."""
     solid = {link.name for link in robot.links if link.boxes}
-    parent = {joint.child: joint.parent for joint in robot.joints}
+    parent = {joint.child: joint.parent for joint in robot.tree}
     found = {frozenset((closure.link_a, closure.link_b)) for closure in robot.closures}
     for name in solid:
         above = parent.get(name)

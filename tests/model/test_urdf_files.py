@@ -23,7 +23,7 @@ FOLDER = Path(pytest.importorskip("pybullet_data").getDataPath())
 
 def model_of(text: str, floating: bool) -> pin.Model:
     bare = re.sub(r"<\?xml[^<>]*\?>", "", text).strip()
-    return pin.buildModelFromXML(bare, *([pin.JointModelFreeFlyer()] if floating else []))
+    return pin.buildModelFromXML(bare, *([pin.JointModelFreeFlyer()] if floating else []), mimic=True)
 
 
 def configuration(model: pin.Model, names: dict[str, float]) -> np.ndarray:
@@ -37,7 +37,7 @@ def configuration(model: pin.Model, names: dict[str, float]) -> np.ndarray:
 @pytest.mark.parametrize("name", NAMES)
 def test_a_public_robot_stands_weighs_and_moves_as_in_pinocchio(name: str) -> None:
     path = FOLDER / f"{name}.urdf"
-    robot = load_urdf(path, repair=False, mimic="free").robot
+    robot = load_urdf(path).robot
     floating = robot.base == "floating"
     model = model_of(path.read_text(errors="replace"), floating)
     data, rng, n = model.createData(), np.random.default_rng(3), len(robot.joints)
@@ -75,7 +75,7 @@ def test_a_public_robot_stands_weighs_and_moves_as_in_pinocchio(name: str) -> No
 @pytest.mark.parametrize("name", NAMES)
 def test_frames_of_a_public_robot_survive_table_and_urdf(name: str) -> None:
     path = FOLDER / f"{name}.urdf"
-    read = load_urdf(path, mimic="free").robot
+    read = load_urdf(path).robot
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", sk.errors.RobotRemark)
         table = sk.robot_from_text(read.text)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import re
+from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -137,25 +137,50 @@ GRIPPER = ARM.replace(
 )
 
 
-def test_coupled_joints_are_refused_with_their_coupling():
-    """A table has no word for them: nothing is read as if they were free unless one asks for it."""
-    told = "<joint> 'follower', key mimic: couples two joints, follower = -2 shoulder +0.1, which tables"
-    with pytest.raises(TableError, match=re.escape(told)):
-        parse_urdf(GRIPPER)
-
-
-def test_coupled_joints_read_as_free_move_as_pinocchio_couples_them():
-    found = parse_urdf(GRIPPER, mimic="free")
-    assert any(remark.endswith("drive them so: follower = -2 shoulder +0.1") for remark in found.remarks)
+@pytest.mark.parametrize("mimic", ["couple", "free"])
+def test_coupled_joints_move_as_pinocchio_couples_them(mimic):
+    found = parse_urdf(GRIPPER, mimic=mimic)
+    free = any(remark.endswith("drive them so: follower = -2 shoulder +0.1") for remark in found.remarks)
+    assert free == (mimic == "free")
+    assert found.robot.joint_names == (("shoulder", "follower") if free else ("shoulder",))
     model = pin.buildModelFromXML(GRIPPER, mimic=True)
     data = model.createData()
     assert model.nq == 1
     for q in (-0.7, 0.4):
         pin.framesForwardKinematics(model, data, np.array([q]))
-        displaced = link_displacements(found.robot, [q, -2 * q + 0.1])
+        displaced = link_displacements(found.robot, [q, -2 * q + 0.1] if free else [q])
         for link, D in zip(found.robot.links, displaced, strict=True):
             placed = data.oMf[model.getFrameId(link.name, pin.FrameType.BODY)].homogeneous
             np.testing.assert_allclose(as_array(D @ link.frame), placed, rtol=0, atol=1e-14)
+
+
+def test_a_joint_that_follows_a_fixed_one_is_fixed_where_that_leaves_it():
+    glued = GRIPPER.replace('<joint name="shoulder" type="revolute">', '<joint name="shoulder" type="fixed">')
+    found = parse_urdf(glued)
+    assert found.robot.joint_names == ()
+    assert "follows a fixed joint, so that it is fixed too: follower = -2 shoulder +0.1" in found.remarks
+    held, free = found.robot.link("base"), parse_urdf(glued, mimic="free").robot
+    com = (link_displacements(free, [0.1])[1] @ free.links[1].com) * 0.3 + free.links[0].com * 2
+    np.testing.assert_allclose(as_array(held.com), as_array(com / 2.3), atol=1e-15)
+
+
+def test_a_joint_that_follows_none_of_the_file_is_read_as_free_with_a_remark():
+    found = parse_urdf(GRIPPER.replace('mimic joint="shoulder"', 'mimic joint="elbow"'))
+    assert found.robot.joint_names == ("shoulder", "follower")
+    assert "follows no joint of the file, read as free: follower = -2 elbow +0.1" in found.remarks
+
+
+def test_limits_that_would_hold_a_leader_are_left_out_with_a_remark():
+    found = parse_urdf(GRIPPER.replace('lower="-9" upper="9"', 'lower="5" upper="9"'))
+    assert any(remark.startswith("limits of coupled joints that would hold") for remark in found.remarks)
+    assert np.isinf(found.robot.coupled[0].upper)
+
+
+def test_urdf_written_of_coupled_joints_reads_back_to_the_same_couplings():
+    robot = parse_urdf(GRIPPER).robot
+    (mine,), (again,) = robot.coupled, parse_urdf(urdf_from_robot(robot)).robot.coupled
+    np.testing.assert_allclose(as_array(again.screw.twist), as_array(mine.screw.twist), atol=1e-15)
+    assert replace(again, screw=mine.screw) == mine
 
 
 @pytest.mark.parametrize("axis", ['<axis xyz="0 0 0"/>', '<axis xyz="none"/>', ""])
@@ -277,11 +302,7 @@ def test_raw_xacro_is_refused_with_the_tool_to_run(raw):
 @pytest.mark.parametrize(
     ("old", "new", "fault"),
     [
-        (
-            "revolute",
-            "floating",
-            "<joint> 'shoulder', key type: is 'floating'. Supported: revolute, continuous",
-        ),
+        ("revolute", "ball", "<joint> 'shoulder', key type: is 'ball'. Supported: revolute, continuous"),
         ('link="upper"', 'link="uper"', "<joint> 'shoulder', key child: there is no link 'uper'. "),
         ('<child link="upper"/>', "", "<joint> 'shoulder', key child: is missing. "),
         ('xyz="0 1 0"', 'xyz="0 0 0"', "<joint> 'shoulder', key axis: is the zero vector. "),
@@ -289,9 +310,9 @@ def test_raw_xacro_is_refused_with_the_tool_to_run(raw):
         ('value="2"', 'value="nan"', "<link> 'upper', key value: found 'nan'. Write 1 finite number(s)"),
         ('value="2"', 'value="-2"', "<link> 'upper', key mass: -2 is negative. "),
         (
-            '<axis xyz="0 1 0"/>',
-            '<mimic joint="x"/>',
-            "<joint> 'shoulder', key mimic: there is no joint",
+            "<axis",
+            '<mimic joint="shoulder"/><axis',
+            "<joint> 'shoulder', key mimic: joints follow one another in a circle: shoulder -> shoulder. ",
         ),
         ('link name="upper"', "link", "<link> 2, key name: is missing. "),
         ('link name="upper"', 'link name="base"', "<link> 'base', key name: is there twice. "),
