@@ -1,7 +1,9 @@
 """python -m benchmarks.verdicts [--only WORDS] [--limit N] [--jobs N] [-o DIR]: verdicts of both engines.
 
 Every walk of ``walks.csv`` is planned and validated in PyBullet and MuJoCo, with rigid servos and with those
-of the robot's table. The result says where the verdicts of the engines differ, and by which criteria.
+of the robot's table. The result says where the verdicts of the engines differ, and by which criteria. Every
+finished walk is appended to ``verdicts.jsonl`` in DIR; a run that ends early goes on from there, and the file
+is removed with the last walk of the list.
 """
 
 from __future__ import annotations
@@ -12,8 +14,10 @@ import json
 import sys
 from collections.abc import Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from random import Random
 
 import screwkin as sk
 from benchmarks.environments import ROOT
@@ -87,6 +91,18 @@ def outcomes(walk: Walk) -> list[Outcome]:
     return rows
 
 
+def done(path: Path) -> list[Outcome]:
+    """The outcomes of the walks that a run which ended early has finished; a torn last line is none."""
+    rows: list[Outcome] = []
+    for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
+        with suppress(json.JSONDecodeError):
+            rows += [
+                Outcome(**row | {"walk": Walk(**row["walk"]), "reasons": tuple(row["reasons"])})
+                for row in json.loads(line)
+            ]
+    return rows
+
+
 def pairs(rows: Iterable[Outcome], servo: str) -> dict[Walk, dict[str, Outcome]]:
     """The outcomes with one kind of servo, by walk and engine."""
     paired: dict[Walk, dict[str, Outcome]] = {}
@@ -153,15 +169,21 @@ def main(arguments: list[str] | None = None) -> int:
     wanted = [walk for walk in walks() if all(word in walk.title for word in words)]
     if asked.limit and asked.limit < len(wanted):
         wanted = [wanted[k * len(wanted) // asked.limit] for k in range(asked.limit)]
-    rows: list[Outcome] = []
-    with ProcessPoolExecutor(asked.jobs) as pool:
-        for k, job in enumerate(as_completed([pool.submit(outcomes, walk) for walk in wanted])):
-            rows += job.result()
-            print(f"{k + 1}/{len(wanted)} {rows[-1].walk.title}", file=sys.stderr)
-    rows.sort(key=lambda row: (wanted.index(row.walk), SERVOS.index(row.servo), ENGINES.index(row.engine)))
     asked.output.mkdir(parents=True, exist_ok=True)
+    finished = asked.output / "verdicts.jsonl"
+    rows = [row for row in done(finished) if row.walk in wanted]
+    left = [walk for walk in wanted if walk not in {row.walk for row in rows}]
+    Random(0).shuffle(left)  # whatever part is done is of all kinds
+    with ProcessPoolExecutor(asked.jobs) as pool, finished.open("a", encoding="utf-8") as file:
+        for k, job in enumerate(as_completed([pool.submit(outcomes, walk) for walk in left])):
+            rows += (own := job.result())
+            file.write(json.dumps([asdict(row) for row in own]) + "\n")
+            file.flush()
+            print(f"{len(wanted) - len(left) + k + 1}/{len(wanted)} {own[0].walk.title}", file=sys.stderr)
+    rows.sort(key=lambda row: (wanted.index(row.walk), SERVOS.index(row.servo), ENGINES.index(row.engine)))
     (asked.output / "verdicts.json").write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n")
     (asked.output / "verdicts.md").write_text(markdown(rows))
+    finished.unlink()
     print(markdown(rows))
     return 0
 

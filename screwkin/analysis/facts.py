@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.se3 import UNTURNED, ZERO, Vector
-from screwkin.mechanism.choice import closed_mechanism, mobility_at, reference_posture
+from screwkin.mechanism.choice import closed_mechanism, mobility_at
 from screwkin.mechanism.mechanism import Mechanism
 from screwkin.mechanism.network import coupling_twists, network_of_twists
 from screwkin.mechanism.singularity import LimbSingularity, singularity_report
 from screwkin.model.robot import Robot
+from screwkin.model.state import reference_posture
 
 
 @dataclass(frozen=True, eq=False)

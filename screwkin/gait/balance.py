@@ -17,6 +17,9 @@ from screwkin.model.robot import Robot
 from screwkin.model.state import State
 from screwkin.trajectory import Trajectory, check_joints
 
+TOUCH = 1e-3
+"""Height above its lowest corner to which a sole touches the floor, by what it gives way [m]."""
+
 
 @dataclass(frozen=True, eq=False)
 @pytree("spikes")
@@ -46,7 +49,10 @@ class Balance:
 
 
 def soles_on_floor(robot: Robot, feet: tuple[str, ...], T_world_tip: Mapping[str, Array]) -> Array:
-    """Corners of every sole seen from above, (T, feet, corners, 2) [m]; soles may differ in corner count."""
+    """Corners of every sole seen from above, (T, feet, corners, 2) [m]; soles may differ in corner count.
+
+    A sole that leans touches with its lowest corners only: in place of the others stands the lowest.
+    """
     outlines = [sole_corners(robot, foot) for foot in feet]
     most = max(len(outline) for outline in outlines)
     padded = [np.concatenate([o, np.repeat(o[-1:], most - len(o), axis=0)]) for o in outlines]
@@ -54,7 +60,10 @@ def soles_on_floor(robot: Robot, feet: tuple[str, ...], T_world_tip: Mapping[str
         np.einsum("tij,kj->tki", T_world_tip[foot][:, :3, :3], corners) + T_world_tip[foot][:, None, :3, 3]
         for foot, corners in zip(feet, padded, strict=True)
     ]
-    return np.stack(placed, axis=1)[..., :2]
+    corners = np.stack(placed, axis=1)
+    lowest = np.take_along_axis(corners, corners[..., 2].argmin(axis=-1)[..., None, None], axis=-2)
+    lifted = corners[..., 2:] > lowest[..., 2:] + TOUCH
+    return np.where(lifted, lowest, corners)[..., :2]
 
 
 def ground_reaction(

@@ -33,12 +33,14 @@ from screwkin.compliance.springs import StiffnessChoice, drive_losses, joint_sti
 from screwkin.compliance.stiffness import Deflection, static_deflection
 from screwkin.compliance.stiffness import Method as StaticModel
 from screwkin.errors import InputError, LimitError, NoSolutionError
-from screwkin.gait.driven import driven
+from screwkin.gait.driven import at_rest, driven
 from screwkin.gait.feed_forward import walking_torques
 from screwkin.gait.loads import load_distribution
+from screwkin.gait.realise import free_rotations
 from screwkin.ik.pose import solve_pose
 from screwkin.kinematics.limits import excess, limits_of, within, worst_joint
 from screwkin.kinematics.positions import link_displacements, pose_in_base
+from screwkin.mechanism.choice import closed_mechanism
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 from screwkin.trajectory import Trajectory, check_joints
@@ -252,11 +254,13 @@ def _deflection(
 
 def _reached(robot: Robot, trajectory: Trajectory, shifts: Array, guess: Array) -> Array:
     """Joint positions (T, n) with the base in place and the feet beside theirs by (T, feet, 3)."""
-    drive, targets = driven(robot), {"base": trajectory.T_world_base}
+    drive, targets = driven(robot, at_rest(trajectory)), {"base": trajectory.T_world_base}
     for i, foot in enumerate(trajectory.feet):
-        targets[foot] = trajectory.T_world_tip[foot].copy()
+        targets[foot] = drive.upright(foot, trajectory.T_world_tip[foot]).copy()
         targets[foot][:, :3, 3] += shifts[:, i]
-    solution = solve_pose(drive.moving, targets, State(trajectory.T_world_base, guess[:, drive.joints]))
+    free = free_rotations(closed_mechanism(drive.moving))
+    start = State(trajectory.T_world_base, guess[:, drive.joints])
+    solution = solve_pose(drive.moving, targets, start, free=free)
     solution.raise_on_failure(drive.moving, trajectory.time)
     reached = guess.copy()
     reached[:, drive.joints] = solution.state.q

@@ -7,7 +7,7 @@ sample, and their rates are the slopes of their positions.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -19,8 +19,10 @@ from screwkin.algebra.se3 import as_array
 from screwkin.compiler.program import kept
 from screwkin.gait.held import with_held_joints
 from screwkin.gait.stance import Stance
+from screwkin.gait.upright import upright
 from screwkin.kinematics.positions import chain_jacobian, successive_displacement, tree_positions
 from screwkin.model.robot import Limb, Robot
+from screwkin.trajectory import Trajectory
 
 POSE, POSITION = 6, 3
 """Joints with which a limb follows a pose, and a position."""
@@ -36,10 +38,13 @@ class Driven:
 
     Attributes:
         robot: the whole robot.
-        moving: the robot without its held joints and without the limbs that rest; itself if there are none.
+        moving: the robot without its held joints and without the limbs that rest, its feet's frames upright
+            on their soles; itself if there is nothing to change.
         joints: indices of the moving joints among the robot's.
         home: q (n,) of the whole robot at home [rad or m].
-        resting: names of the limbs that follow no target.
+        resting: names of the limbs that have too few joints to follow a target.
+        at_rest: names of further limbs that follow none.
+        turned: by tip whose frame was none on its sole, pose (4, 4) of the frame on it in that frame.
     """
 
     robot: Robot
@@ -47,6 +52,8 @@ class Driven:
     joints: tuple[int, ...]
     home: Array
     resting: tuple[str, ...]
+    at_rest: tuple[str, ...]
+    turned: Mapping[str, Array]
 
     def positions(self, q: Array) -> Array:
         """Joint positions (T, n) of the whole robot from those of the moving joints (T, m)."""
@@ -60,6 +67,11 @@ class Driven:
         whole[:, self.joints] = qd
         return whole
 
+    def upright(self, tip: str, T_world_tip: Array) -> Array:
+        """Poses (T, 4, 4) of the frame that a gait leads, from those of a tip."""
+        turned = self.turned.get(tip)
+        return T_world_tip if turned is None else T_world_tip @ turned
+
     def stance(self, stance: Stance) -> Stance:
         """The stance without hands that rest."""
         return replace(stance, hands=tuple(h for h in stance.hands if h.name in self.moving.tip_names))
@@ -71,7 +83,7 @@ class Driven:
         return tuple(f"{name} {few}" for name in self.resting)
 
 
-def driven(robot: Robot) -> Driven:
+def driven(robot: Robot, at_rest: tuple[str, ...] = ()) -> Driven:
     """What a gait drives of a robot with a ``home`` posture.
 
     Legs follow poses with up to six joints of their own. Arms follow poses with six joints, positions with
@@ -79,27 +91,44 @@ def driven(robot: Robot) -> Driven:
 
     Args:
         robot: with a ``home`` posture.
+        at_rest: names of further limbs that follow no target.
     """
-    moving, joints, home, resting = _moving(robot)
-    return Driven(robot, moving or robot, joints, home, resting)
+    moving, joints, home, resting, turned = _moving(robot, at_rest)
+    return Driven(robot, moving or robot, joints, home, resting, at_rest, turned)
+
+
+Parts = tuple[Robot | None, tuple[int, ...], Array, tuple[str, ...], Mapping[str, Array]]
+
+
+def at_rest(trajectory: Trajectory) -> tuple[str, ...]:
+    """Names of the limbs that rest in a walk though they have joints enough."""
+    names = trajectory.meta.get("at_rest", ())
+    return tuple(names) if isinstance(names, list | tuple) else ()
 
 
 @kept
-def _moving(robot: Robot) -> tuple[Robot | None, tuple[int, ...], Array, tuple[str, ...]]:
+def _moving(robot: Robot, at_rest: tuple[str, ...]) -> Parts:
     """The parts of ``driven``, but None for the robot itself: what is compiled for them lasts as it does."""
     home = np.array(robot.posture("home").q, dtype=float)
     home.flags.writeable = False
+    standing = upright(robot)
+    turned = {
+        limb.tip: as_array(limb.frame.inverse @ other.frame).astype(float)
+        for limb, other in zip(robot.limbs, standing.limbs, strict=True)
+        if limb.frame is not other.frame
+    }
     if robot.closures:
-        return None, tuple(range(len(home))), home, ()
+        return None if standing is robot else standing, tuple(range(len(home))), home, (), turned
     chosen = {limb.name: _chosen(robot, limb, home) for limb in robot.limbs}
-    moving = {i for joints in chosen.values() for i in joints}
+    few = tuple(name for name, joints in chosen.items() if not joints)
+    resting = {*few, *at_rest}
+    moving = {i for name, joints in chosen.items() if name not in at_rest for i in joints}
     rest = {joint.name: float(home[i]) for i, joint in enumerate(robot.joints) if i not in moving}
-    resting = tuple(limb.name for limb in robot.limbs if not chosen[limb.name])
-    reduced = with_held_joints(robot, rest)
+    reduced = with_held_joints(standing, rest)
     if resting:
         limbs = tuple(limb for limb in reduced.limbs if limb.name not in resting)
         reduced = replace(reduced, limbs=limbs)
-    return None if reduced is robot else reduced, tuple(sorted(moving)), home, resting
+    return None if reduced is robot else reduced, tuple(sorted(moving)), home, few, turned
 
 
 def _chosen(robot: Robot, limb: Limb, home: Array) -> tuple[int, ...]:

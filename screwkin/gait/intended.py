@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 from screwkin.gait.compensation import change_rates
-from screwkin.gait.driven import POSE, driven
+from screwkin.gait.driven import POSE, at_rest, driven
+from screwkin.gait.realise import free_rotations
 from screwkin.ik.pose import solve_pose
+from screwkin.mechanism.choice import closed_mechanism
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 from screwkin.trajectory import Trajectory
@@ -27,14 +29,14 @@ def intended(robot: Robot, trajectory: Trajectory) -> Trajectory:
     """
     if "compensation" not in trajectory.meta:
         return trajectory
-    drive = driven(robot)
+    drive = driven(robot, at_rest(trajectory))
     moving, targets = drive.moving, {"base": trajectory.T_world_base}
     for limb in moving.limbs:
-        pose = trajectory.T_world_tip[limb.tip]
+        pose = drive.upright(limb.tip, trajectory.T_world_tip[limb.tip])
         whole = limb.tip in trajectory.feet or len(moving.path_to(limb.link)) >= POSE
         targets[limb.tip] = pose if whole else pose[:, :3, 3]
     guess = State(trajectory.T_world_base, trajectory.q[:, drive.joints])
-    solution = solve_pose(moving, targets, guess)
+    solution = solve_pose(moving, targets, guess, free=free_rotations(closed_mechanism(moving)))
     solution.raise_on_failure(moving, trajectory.time)
     q = drive.positions(solution.state.q)
     return replace(trajectory, q=q, qd=trajectory.qd - change_rates(trajectory.time, trajectory.q - q))

@@ -88,6 +88,7 @@ def plan(gait: Gait, stance: Stance, steps: int) -> Plan:
     if gait.kind != "geometric":
         found = f"a gait of kind {gait.kind!r} does not consist of key points alone"
         raise GaitError(_where(gait), [Fault("[gait]", "kind", found, 'Give one of kind "geometric"')])
+    check_fitted(gait)
     check_rate(gait)
     timing = Timing(gait.Tc, steps, gait.ramp)
     time = sample_times(gait, timing)
@@ -172,6 +173,17 @@ def sample_times(gait: Gait, timing: Timing) -> Array:
             _where(gait), [Fault("[gait]", "rate", found, f"Keep them between 2 and {MOST_SAMPLES:,}")]
         )
     return timing.samples(gait.rate)
+
+
+def check_fitted(gait: Gait) -> None:
+    """Refuse a gait in lengths of a robot that is not known.
+
+    Raises:
+        GaitError: names the keys.
+    """
+    if gait.unfitted:
+        found = f"{', '.join(gait.unfitted)} depend on the robot, and it was fitted to none"
+        raise GaitError(_where(gait), [Fault("[gait]", "", found, "Use walk(robot, gait)")])
 
 
 def check_rate(gait: Gait) -> None:

@@ -21,11 +21,13 @@ from screwkin.gait.balance import ground_reaction
 from screwkin.gait.footsteps import Foothold, footholds, swing_side
 from screwkin.gait.motion import Motion, along
 from screwkin.gait.path import path_of
-from screwkin.gait.plan import Plan, check_rate, plan_around, whole_steps
+from screwkin.gait.plan import Plan, check_fitted, check_rate, plan_around, whole_steps
 from screwkin.gait.preview import CartMotion, follow_reference, preview_gains
 from screwkin.gait.realise import differentiate, positions
 from screwkin.gait.record import Gait
 from screwkin.gait.stance import Stance
+from screwkin.ik.numeric import IkSettings
+from screwkin.ik.whole_body import PRECISE
 from screwkin.kinematics.mass import mass_center
 from screwkin.kinematics.positions import link_displacements
 from screwkin.mechanism.mechanism import Mechanism
@@ -39,7 +41,9 @@ TRACKED = 1e-9
 """How closely the CoM follows its reference [m]."""
 
 
-def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -> Plan:
+def preview_plan(
+    mechanism: Mechanism, gait: Gait, stance: Stance, steps: int, ik: IkSettings = PRECISE
+) -> Plan:
     """The plan of a gait of kind ``preview``.
 
     Args:
@@ -47,6 +51,7 @@ def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -
         gait: ``dsp`` (fraction of Tc), ``horizon`` [s], ``Qe``, ``Qx``, ``R`` are its own parameters.
         stance: feet, soles and shoulders of the robot.
         steps: number of swings, at least 1.
+        ik: settings of the inverse kinematics.
 
     Returns:
         Plan of (steps + 2) Tc rate samples.
@@ -55,6 +60,7 @@ def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -
         GaitError: a setting is missing or wrong. NoSolutionError: out of reach, or feet that overlap.
     """
     steps = whole_steps(steps)
+    check_fitted(gait)
     settings = _settings(gait)
     check_rate(gait)
     count = round((steps + 2) * gait.Tc * gait.rate)
@@ -72,7 +78,7 @@ def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -
     if gait.com == "true":
         rest = np.zeros((1, 2))
         standing = around(CartMotion(reference[:1], rest, rest, reference[:1]), slice(1))
-        stand, q = _followed(mechanism, standing, reference[:1])
+        stand, q = _followed(mechanism, standing, reference[:1], ik)
         height = _com(mechanism.robot, stand, q)[0, 2]
     gains = preview_gains(
         1 / gait.rate, height, settings["horizon"], settings["Qe"], settings["Qx"], settings["R"]
@@ -81,7 +87,7 @@ def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -
     planned = around(cart)
     if gait.com == "waist":
         return replace(planned, notes=("the waist is taken for the CoM",))
-    return _tracked(mechanism, planned, cart)
+    return _tracked(mechanism, planned, cart, ik)
 
 
 def zmp_reference(gait: Gait, stance: Stance, holds: tuple[Foothold, ...], steps: int, time: Array) -> Array:
@@ -179,23 +185,23 @@ def _com(robot: Robot, planned: Plan, q: Array) -> Array:
     return np.asarray(as_array(pose_from_array(planned.T_world_base) @ mass_center(robot, D), (len(q),)))
 
 
-def _followed(mechanism: Mechanism, planned: Plan, wanted: Array) -> tuple[Plan, Array]:
+def _followed(mechanism: Mechanism, planned: Plan, wanted: Array, ik: IkSettings) -> tuple[Plan, Array]:
     """The plan with its waist moved until the CoM stands over ``wanted`` (T, 2), and its joint positions."""
-    q = positions(mechanism, planned).state.q
+    q = positions(mechanism, planned, settings=ik).state.q
     share = _share(mechanism, planned, q)
     for _ in range(20):
         error = wanted - _com(mechanism.robot, planned, q)[:, :2]
         if np.abs(error).max() < TRACKED:
             return planned, q
         planned = _moved(planned, _solved(share, error))
-        q = positions(mechanism, planned, q).state.q
+        q = positions(mechanism, planned, q, ik).state.q
     far = 1e3 * np.abs(error).max()
     raise NoSolutionError(f"the waist cannot bring the CoM to its reference; {far:.2g} mm are missing")
 
 
-def _tracked(mechanism: Mechanism, planned: Plan, cart: CartMotion) -> Plan:
+def _tracked(mechanism: Mechanism, planned: Plan, cart: CartMotion, ik: IkSettings) -> Plan:
     """The plan whose CoM of all links follows the cart, in all three derivatives."""
-    planned, q = _followed(mechanism, planned, cart.com)
+    planned, q = _followed(mechanism, planned, cart.com, ik)
     share, none = _share(mechanism, planned, q), np.zeros_like(cart.com)
     velocity, _ = _com_rates(mechanism, planned, q)
     planned = _driven(planned, _solved(share, cart.velocity - velocity), none)

@@ -1,4 +1,4 @@
-"""Why a robot cannot follow a plan: the freedom that a limb has not, or the key of the gait to change."""
+"""Why a robot cannot follow a plan: a target beyond reach or limits, or a freedom that a limb has not."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.screws import at
@@ -21,6 +22,7 @@ from screwkin.kinematics.positions import (
     pose_in_base,
     successive_displacement,
 )
+from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.model.robot import Limb, Robot
 from screwkin.model.state import State
 
@@ -36,8 +38,35 @@ _FREEDOMS = (
 )
 
 
+Free = Mapping[str, tuple[str, ...]]
+"""By tip, the rotations of its virtual chain that follow."""
+
+
+def refuse_turns(robot: Robot, plan: Plan, free: Free) -> None:
+    """Raise where a plan turns feet about the vertical whose limbs have no joint for it.
+
+    Args:
+        robot: the robot.
+        plan: what it is to follow.
+        free: rotations of tips that follow.
+
+    Raises:
+        UnreachableError: names limb, sample and time, and what to change.
+    """
+    for foot in plan.feet:
+        R = plan.T_world_tip[foot][:, :2, 0]
+        turned = np.flatnonzero(np.abs(R[:, 0] * R[0, 1] - R[:, 1] * R[0, 0]) > _MISSING)
+        if "rz" in free.get(foot, ()) and len(turned):
+            limb, sample = robot.limb(foot), int(turned[0])
+            joints = ", ".join(robot.joints[i].name for i in robot.path_to(limb.link))
+            when = f"{limb.name}, sample {sample} (t = {float(plan.time[sample]):.3f} s)"
+            missing = f"no joint of {limb.name} ({joints}) turns {foot} about the vertical"
+            advice = f"straight and sideways walks do not; set turn = 0 (now {plan.gait.turn:.3g} rad)"
+            raise UnreachableError(f"{when}: {missing}; a turn needs one, {advice}", limb.name, sample)
+
+
 def refuse_unreachable(
-    robot: Robot, plan: Plan, targets: Mapping[str, Array], solution: PoseSolution
+    robot: Robot, plan: Plan, targets: Mapping[str, Array], solution: PoseSolution, free: Free
 ) -> None:
     """Raise for the first sample that a robot cannot follow.
 
@@ -46,9 +75,10 @@ def refuse_unreachable(
         plan: what it is to follow.
         targets: world poses (T, 4, 4) or positions (T, 3) of the tips, by name.
         solution: of these targets.
+        free: rotations of tips that follow.
 
     Raises:
-        UnreachableError, SingularError, LimitError: name limb, sample and time, and what to change.
+        UnreachableError, SingularError, LimitError: name limb, sample and time.
     """
     try:
         solution.raise_on_failure(robot, plan.time)
@@ -57,41 +87,60 @@ def refuse_unreachable(
         missing = _missing_freedom(robot, limb, targets[limb.tip][sample], solution, sample)
         when = f"{limb.name}, sample {sample} (t = {float(plan.time[sample]):.3f} s)"
         if missing:
-            raise UnreachableError(f"{when}: {missing}; {_other_gait(plan)}", limb.name, sample) from None
-        error.args = (f"{error}. {_advice(robot, plan, limb)}",)
+            raise UnreachableError(f"{when}: {missing}", limb.name, sample) from None
         raise
     for limb in robot.limbs:
-        _refuse_other_branch(robot, plan, targets, solution, limb)
+        _refuse_other_branch(robot, plan, targets, solution, limb, free)
 
 
-def _refuse_other_branch(
-    robot: Robot, plan: Plan, targets: Mapping[str, Array], solution: PoseSolution, limb: Limb
-) -> None:
-    """Refuse samples in which a limb stands beyond a singular posture, where only limits can have put it.
+def on_other_branch(
+    robot: Robot, targets: Mapping[str, Array], solution: PoseSolution, limb: Limb, free: Free
+) -> NDArray[np.bool_]:
+    """Samples (T,) in which a limb stands beyond a singular posture, where only limits can have put it.
 
     The determinant of a limb's Jacobian keeps its sign on the way from home; it is judged for limbs with as
     many joints as their targets have freedoms.
 
-    Raises:
-        LimitError: names limb, sample and time, and the joint that meets its limit on the way.
+    Args:
+        robot: the robot.
+        targets: world poses (T, 4, 4) or positions (T, 3) of the tips, by name.
+        solution: of these targets.
+        limb: one of the robot's.
+        free: rotations of tips that follow.
     """
     path, target = list(robot.path_to(limb.link)), targets.get(limb.tip)
+    q = np.reshape(solution.state.q, (-1, len(robot.joints)))
     posed = target is not None and target.shape[-2:] == (4, 4)
-    if target is None or len(path) != (6 if posed else 3):
-        return
-    start = np.array(robot.posture("home").q, dtype=float)
-    q = np.concatenate([start[None], np.reshape(solution.state.q, (-1, len(start)))])
-    screws, thetas = [robot.joints[i].screw for i in path], unstack(q[:, path])
+    chain = SerialChain.of(robot, limb.name, free.get(limb.tip, ()) if posed else ())
+    if target is None or len(chain.joints) != (6 if posed else 3):
+        return np.zeros(len(q), dtype=bool)
+    q = np.concatenate([np.array(robot.posture("home").q, dtype=float)[None], q])
+    virtual = np.zeros((len(q), len(chain.joints) - len(path)))
+    screws, thetas = [robot.joints[i].screw for i in path], unstack(np.hstack([q[:, path], virtual]))
+    screws += chain.screws[len(path) :]
     tip = successive_displacement(screws, thetas, A_ref_k=limb.frame).p
     columns = [as_array(at(tip, column), (len(q),)) for column in chain_jacobian(screws, thetas)]
     sense = np.linalg.det(np.stack(columns, axis=-1)[:, slice(0 if posed else 3, 6)])
-    other = np.flatnonzero(sense[1:] * sense[0] < 0)
-    if not len(other) or abs(sense[0]) < _MISSING * np.abs(sense).max():
+    judged = abs(sense[0]) >= _MISSING * np.abs(sense).max()
+    return np.asarray((sense[1:] * sense[0] < 0) & judged)
+
+
+def _refuse_other_branch(
+    robot: Robot, plan: Plan, targets: Mapping[str, Array], solution: PoseSolution, limb: Limb, free: Free
+) -> None:
+    """Refuse samples on another branch than home's.
+
+    Raises:
+        LimitError: names limb, sample and time, and the joint that meets its limit on the way.
+    """
+    other = np.flatnonzero(on_other_branch(robot, targets, solution, limb, free))
+    if not len(other):
         return
-    sample, free = int(other[0]), [replace(j, lower=-np.inf, upper=np.inf) for j in robot.joints]
+    path, start = list(robot.path_to(limb.link)), np.array(robot.posture("home").q, dtype=float)
+    sample, wide = int(other[0]), [replace(j, lower=-np.inf, upper=np.inf) for j in robot.joints]
     one = {name: target[sample] for name, target in targets.items()}
-    unlimited = replace(robot, joints=tuple(free))
-    near = solve_pose(unlimited, one, State(plan.T_world_base[sample], start)).state.q
+    unlimited = replace(robot, joints=tuple(wide))
+    near = solve_pose(unlimited, one, State(plan.T_world_base[sample], start), free=free).state.q
     beyond = [max(robot.joints[i].lower - near[i], near[i] - robot.joints[i].upper) for i in path]
     worst = path[int(np.argmax(beyond))]
     joint = robot.joints[worst]
@@ -100,7 +149,7 @@ def _refuse_other_branch(
     limits = f"limits {factor * joint.lower:.1f} to {factor * joint.upper:.1f} {unit}"
     raise LimitError(
         f"{when}: {joint.name} at {factor * float(near[worst]):.1f} {unit}, {limits}; bent the other way the"
-        f" limb would pass a singular posture. {_advice(robot, plan, limb)}",
+        f" limb would pass a singular posture",
         limb.name,
         sample,
     )
@@ -140,22 +189,3 @@ def _residual(
     tip, wanted = pose_in_base(robot, D, limb.tip), T.inverse @ pose_from_array(target)
     turn, gap = rotation_log(wanted.R @ tip.R.T), wanted.p - tip.p
     return np.concatenate([as_array(waist.R.T @ v).astype(float) for v in (turn, gap)])
-
-
-def _other_gait(plan: Plan) -> str:
-    if plan.gait.turn:
-        return f"set turn = 0 (now {plan.gait.turn:.3g} rad), or choose a gait that goes straight or sideways"
-    return f"choose another gait than {plan.gait.name}"
-
-
-def _advice(robot: Robot, plan: Plan, limb: Limb) -> str:
-    """Keys of the gait that bring a limb's targets nearer, with their values now and at home."""
-    gait, back = plan.gait, waist_frame(robot).inverse
-    D = link_displacements(robot, list(robot.posture("home").q))
-    tip = (back @ pose_in_base(robot, D, limb.tip)).p
-    if limb.kind != "leg":
-        drop = float((back @ limb_root(robot, limb.name)).z - tip.z)
-        return f"Set hand_drop (now {gait.hand_drop:g} m) nearer to that at home, {drop:.3g} m"
-    height = f"Set waist_height (now {gait.waist_height:g} m) nearer to that at home, {-float(tip.z):.3g} m"
-    moved = [f"{key} ({getattr(gait, key):g})" for key in ("stride", "side", "turn") if getattr(gait, key)]
-    return f"{height}, or bring {', '.join([*moved, f'lift ({gait.lift:g})'])} nearer to 0"

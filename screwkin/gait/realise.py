@@ -12,9 +12,11 @@ from screwkin.algebra.se3 import (
     vector_from_array,
 )
 from screwkin.gait.plan import Plan
-from screwkin.gait.reach import refuse_unreachable
+from screwkin.gait.reach import refuse_turns, refuse_unreachable
+from screwkin.ik.numeric import IkSettings
 from screwkin.ik.pose import solve_pose
 from screwkin.ik.pose_solution import PoseSolution
+from screwkin.ik.whole_body import PRECISE
 from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.mechanism.choice import RANK_TOLERANCE
 from screwkin.mechanism.joint_motion import JointMotion, joint_motion
@@ -23,13 +25,16 @@ from screwkin.mechanism.singularity import refuse_singular
 from screwkin.model.state import State
 
 
-def positions(mechanism: Mechanism, planned: Plan, guess: Array | None = None) -> PoseSolution:
+def positions(
+    mechanism: Mechanism, planned: Plan, guess: Array | None = None, settings: IkSettings = PRECISE
+) -> PoseSolution:
     """Joint positions that follow a plan.
 
     Args:
         mechanism: of a robot whose joints follow from base and tips.
         planned: T samples.
         guess: (T, n) or (n,) [rad or m]; default: the home posture.
+        settings: of the inverse kinematics.
 
     Returns:
         PoseSolution of all samples; every one converged.
@@ -39,14 +44,33 @@ def positions(mechanism: Mechanism, planned: Plan, guess: Array | None = None) -
     """
     robot = mechanism.robot
     start = np.array(robot.posture("home").q) if guess is None else guess
-    targets = {"base": planned.T_world_base, **_targets(mechanism, planned)}
-    solution = solve_pose(robot, targets, State(planned.T_world_base, start))
-    refuse_unreachable(robot, planned, targets, solution)
+    targets = {"base": planned.T_world_base, **targets_of(mechanism, planned)}
+    free = free_rotations(mechanism)
+    refuse_turns(robot, planned, free)
+    solution = solve_pose(robot, targets, State(planned.T_world_base, start), settings=settings, free=free)
+    refuse_unreachable(robot, planned, targets, solution, free)
     return solution
 
 
-def _targets(mechanism: Mechanism, planned: Plan) -> dict[str, Array]:
-    """Poses of the feet; of the hands the positions, or poses level with the waist where all is imposed."""
+def free_rotations(mechanism: Mechanism) -> dict[str, tuple[str, ...]]:
+    """By tip, the rotations of its virtual chain that follow."""
+    free = {
+        chain.name: tuple(
+            c for c in chain.couplings if c[0] == "r" and f"{chain.name}.{c}" in mechanism.secondary
+        )
+        for chain in mechanism.chains
+        if chain.limb is not None
+    }
+    return {tip: rotations for tip, rotations in free.items() if rotations}
+
+
+def targets_of(mechanism: Mechanism, planned: Plan) -> dict[str, Array]:
+    """Poses of the feet; of the hands the positions, or poses level with the waist where all is imposed.
+
+    Args:
+        mechanism: of a robot whose joints follow from base and tips.
+        planned: T samples.
+    """
     robot = mechanism.robot
     home = link_displacements(robot, list(robot.posture("home").q))
     targets: dict[str, Array] = dict(planned.T_world_tip)

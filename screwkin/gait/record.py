@@ -1,12 +1,14 @@
 """The gait as a value: parameters and key points, checked and evaluated.
 
 A gait comes from a document, the content of its file as plain dictionaries, which it holds: changing a
-parameter evaluates every formula again, and ``to_dict`` returns what makes the same gait.
+parameter evaluates every formula again, and ``to_dict`` returns what makes the same gait. Formulas may use
+lengths of the robot at hand (``screwkin.gait.lengths``); what depends on them is NaN until it is known.
 """
 
 from __future__ import annotations
 
 import copy
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, cast
@@ -14,8 +16,9 @@ from typing import Any, Literal, cast
 from screwkin.errors import Fault, GaitError, near
 from screwkin.gait.free_path import read_free_waist
 from screwkin.gait.keypoints import CHANNELS, Channel, channel_faults, increases, read_channel
+from screwkin.gait.relative import FREE, NOMINAL, read_lengths, relative_to_robot
 from screwkin.gait.settings import place, valid_keys
-from screwkin.model.expression import resolve_parameters
+from screwkin.model.expression import names_in, resolve_parameters
 
 Kind = Literal["geometric", "preview"]
 Swing = Literal["cubic", "minimum-jerk"]
@@ -52,7 +55,7 @@ FLAT = (*TEXTS, *CHOICES, *NUMBERS)
 """Every key of the table ``[gait]``."""
 
 _POSITIVE = ("Tc", "lift", "waist_height", "hand_drop", "rate")
-_TABLES = ("gait", "parameters", "channel", "waist")
+_TABLES = ("gait", "parameters", "channel", "waist", "lengths")
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +71,8 @@ class Gait:
     feet side by side); first: the foot that swings first. com: what a preview gait steers, the ``true`` CoM
     of all links or, naively, the ``waist``.
     swing: spline of a swing. numbers: all of these and the file's own parameters. channels: key points.
-    waist: coefficients of a free waist path, or empty.
+    waist: coefficients of a free waist path, or empty. lengths: of the robot that it is fitted to [m]; empty
+    before, when every number that depends on them is NaN.
     """
 
     name: str
@@ -94,14 +98,26 @@ class Gait:
     numbers: Mapping[str, float]
     channels: Mapping[str, Channel]
     waist: Mapping[str, tuple[float, ...]]
+    lengths: Mapping[str, float] = field(default_factory=dict)
     path: str = ""
     _document: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
     def __repr__(self) -> str:
+        Tc, stride, side, turn = (self._shown(key) for key in ("Tc", "stride", "side", "turn"))
         return (
-            f"Gait {self.name!r} ({self.kind}): {self.steps} steps of {self.Tc:g} s, "
-            f"stride {self.stride:g} m, side {self.side:g} m, turn {self.turn:g} rad, rate {self.rate:g} Hz"
+            f"Gait {self.name!r} ({self.kind}): {self.steps} steps of {Tc} s, "
+            f"stride {stride} m, side {side} m, turn {turn} rad, rate {self.rate:g} Hz"
         )
+
+    def _shown(self, key: str) -> str:
+        value = self.numbers[key]
+        return str(self._document["gait"][key]) if math.isnan(value) else f"{value:g}"
+
+    @property
+    def unfitted(self) -> tuple[str, ...]:
+        """Keys whose numbers depend on lengths of a robot that is not known yet; ``fitted`` knows it."""
+        channels = [f"channel.{c.name}" for c in self.channels.values() if math.isnan(c.at[0] + c.value[0])]
+        return (*(key for key, value in self.numbers.items() if math.isnan(value)), *channels)
 
     def replace(self, **parameters: Any) -> Gait:
         """The gait with other parameters; numbers may be given as text or formulas, as on a command line.
@@ -131,7 +147,7 @@ class Gait:
 
 
 def gait_from_dict(document: Mapping[str, Any], path: str = "<gait>") -> Gait:
-    """The gait of a document: tables ``gait``, ``parameters``, ``channel`` and ``waist``.
+    """The gait of a document: tables ``gait``, ``parameters``, ``channel``, ``waist`` and ``lengths``.
 
     Args:
         document: as read from a gait file or from ``Gait.to_dict``.
@@ -143,18 +159,24 @@ def gait_from_dict(document: Mapping[str, Any], path: str = "<gait>") -> Gait:
     faults: list[Fault] = []
     tables = _tables(document, faults)
     flat = _flat(tables["gait"], faults)
-    numbers = _numbers(flat, tables["parameters"], faults)
+    lengths = read_lengths(tables["lengths"], faults)
+    numbers = _numbers(flat, tables["parameters"], lengths, faults)
     channels = _channels(tables, flat, numbers, faults)
     waist = read_free_waist(tables["waist"], faults)
     _check_complete(flat["kind"], channels, waist, tables["channel"], faults)
     if faults:
         raise GaitError(path, faults)
-    values = cast(dict[str, float], numbers)
+    values = {name: cast(float, value) for name, value in numbers.items() if name not in NOMINAL}
+    if not lengths:
+        open_ = relative_to_robot(_raw_numbers(flat, tables["parameters"]))
+        values |= dict.fromkeys(open_ & {*values}, math.nan)
+        channels = {name: _without_numbers(c, tables["channel"][name], open_) for name, c in channels.items()}
     return Gait(
         **flat | {name: values[name] for name in NUMBERS} | {"steps": int(values["steps"])},
         numbers=values,
         channels=channels,
         waist=waist,
+        lengths=lengths,
         path=path,
         _document=copy.deepcopy({**tables, "gait": flat}),
     )
@@ -209,18 +231,43 @@ def _raw_numbers(flat: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, A
     }
 
 
-def _numbers(flat: Mapping[str, Any], own: Mapping[str, Any], faults: list[Fault]) -> dict[str, float | None]:
-    """Values of all numeric parameters; None for a faulty one."""
+def _without_numbers(channel: Channel, raw: Mapping[str, Any], open_: frozenset[str]) -> Channel:
+    """The channel with NaN for its times or values if one of them depends on an unknown length."""
+
+    def known(key: str) -> bool:
+        return not any(open_ & {*names_in(item)} for item in raw[key])
+
+    at, value = (
+        getattr(channel, key) if known(key) else getattr(channel, key) * math.nan for key in ("at", "value")
+    )
+    return Channel(channel.name, at, value)
+
+
+def _numbers(
+    flat: Mapping[str, Any], own: Mapping[str, Any], lengths: Mapping[str, float], faults: list[Fault]
+) -> dict[str, float | None]:
+    """Values of all numeric parameters, and of the robot's lengths; None for a faulty one."""
     for key in own:
         if key in FLAT:
             found = f"{key!r} is a parameter of [gait]"
             faults.append(Fault("[parameters]", key, found, "Set it there, or choose another name"))
-    values, wrong = resolve_parameters(_raw_numbers(flat, own), row="[gait]")
+        elif key in NOMINAL:
+            found = f"{key!r} is a length of the robot at hand"
+            faults.append(Fault("[parameters]", key, found, "Choose another name"))
+    raw = _raw_numbers(flat, own)
+    relative = relative_to_robot(raw)
+    faults += [
+        Fault("[gait]", key, f"{raw[key]!r} depends on the robot", "Give a number that suits any robot")
+        for key in FREE
+        if key in relative
+    ]
+    values, wrong = resolve_parameters(raw | dict(lengths or NOMINAL), row="[gait]")
     faults += [fault if fault.key in NUMBERS else _moved(fault, "[parameters]") for fault in wrong]
     numbers = {name: None if value is None else float(value) for name, value in values.items()}
     for key in (*_POSITIVE, "ramp"):
         value, least = numbers.get(key), "at least 0" if key == "ramp" else "above 0"
-        if value is not None and (value < 0 or (value == 0 and key != "ramp")):
+        known = lengths or key not in relative
+        if known and value is not None and (value < 0 or (value == 0 and key != "ramp")):
             faults.append(Fault("[gait]", key, f"{value:g} is not {least}", f"Give a number {least}"))
             numbers[key] = None
     steps = numbers.get("steps")
@@ -255,7 +302,8 @@ def _channels(
             continue
 
         def works_at(Tc: float, name: str = name, raw: Any = raw) -> bool:
-            at_that, _ = resolve_parameters(_raw_numbers({**flat, "Tc": Tc}, tables["parameters"]))
+            lengths = {name: numbers[name] for name in NOMINAL}
+            at_that, _ = resolve_parameters(_raw_numbers({**flat, "Tc": Tc}, tables["parameters"]) | lengths)
             other = read_channel(name, raw, at_that, [])
             return other is not None and increases(other)
 

@@ -7,18 +7,16 @@ from itertools import product
 
 import numpy as np
 
-from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import IDENTITY, Pose, Vector
 from screwkin.compiler.program import kept
 from screwkin.dynamics.support import sole_corners
 from screwkin.errors import InputError, ShapeError
+from screwkin.gait.upright import upright
 from screwkin.kinematics.landmarks import limb_root, waist_frame
 from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.model.robot import Limb, Robot
 
 LEFT, RIGHT = 1, -1
-_LEVEL = np.cos(np.deg2rad(1.0))
-"""Cosine of the angle by which a foot's z axis may lean off its sole's normal."""
 
 
 @dataclass(frozen=True)
@@ -88,23 +86,25 @@ def stance_of(robot: Robot) -> Stance:
     """What a gait must know of a robot, from its axes, tips and soles at the home posture.
 
     Args:
-        robot: with a floating base, one leg on either side, and a ``home`` posture.
+        robot: with a floating base, one leg on either side, and a ``home`` posture; feet's frames may be any.
 
     Raises:
         InputError: a fixed base, no ``home`` posture, not one leg on either side, a leg without sole, or a
-            foot whose frame does not stand upright on its sole.
+            foot whose frame does not tell forward.
     """
     if robot.base != "floating":
         raise InputError(f"robot {robot.name} has a fixed base; only one with a floating base can walk")
     if "home" not in [posture.name for posture in robot.postures]:
         raise InputError(f"robot {robot.name} has no posture 'home'; a walk needs one with bent knees")
+    robot = upright(robot)
     D, back = link_displacements(robot, list(robot.posture("home").q)), waist_frame(robot).inverse
     feet, hands, places = [], [], []
     for limb in robot.limbs:
         y = float((back @ pose_in_base(robot, D, limb.tip).p).y)
         side = LEFT if y > 0 else RIGHT
         if limb.kind == "leg":
-            feet.append(Foot(limb.tip, side, _sole(robot, limb), _body(robot, limb)))
+            sole = tuple((float(x), float(y)) for x, y, _ in sole_corners(robot, limb.tip))
+            feet.append(Foot(limb.tip, side, sole, _body(robot, limb)))
             places.append(abs(y))
         else:
             x, y, z = back @ limb_root(robot, limb.name)
@@ -112,24 +112,6 @@ def stance_of(robot: Robot) -> Stance:
     if sorted(foot.side for foot in feet) != [RIGHT, LEFT]:
         raise InputError(f"robot {robot.name} has {len(feet)} legs; a walk needs one on either side")
     return Stance(sum(places) / len(places), tuple(feet), tuple(hands), back)
-
-
-def _sole(robot: Robot, limb: Limb) -> tuple[tuple[float, float], ...]:
-    """Corners (x, y) of a leg's sole in the frame of its tip, whose z axis is the sole's normal [m]."""
-    corners = sole_corners(robot, limb.tip)
-    normal = _normal(corners)
-    if normal[2] < _LEVEL * np.linalg.norm(normal):
-        lean = np.degrees(np.arccos(np.clip(normal[2] / np.linalg.norm(normal), -1, 1)))
-        raise InputError(
-            f"robot {robot.name}: the z axis of {limb.tip} leans by {lean:.3g} deg off its sole's normal;"
-            f" a gait sets feet down by their frames: turn the frame of limb {limb.name} (x forward, z up)"
-        )
-    return tuple((float(x), float(y)) for x, y, _ in corners)
-
-
-def _normal(corners: Array) -> Array:
-    """Normal (3,) of a polygon (k, 3) that runs counter-clockwise about it; twice its area long."""
-    return np.asarray(np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0))
 
 
 def _body(robot: Robot, limb: Limb) -> tuple[tuple[float, float], ...]:

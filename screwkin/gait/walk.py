@@ -2,27 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+
+import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, pose_from_array, unstack
-from screwkin.errors import expect
+from screwkin.errors import NoSolutionError, expect
 from screwkin.files import text_sha256, versions
 from screwkin.gait.balance import ground_margin, ground_reaction, soles_on_floor
-from screwkin.gait.driven import driven
-from screwkin.gait.plan import Plan, plan
-from screwkin.gait.preview_plan import preview_plan
-from screwkin.gait.realise import differentiate, positions
+from screwkin.gait.follow import Followed, follow
+from screwkin.gait.lengths import fitted
+from screwkin.gait.realise import free_rotations
 from screwkin.gait.record import Gait
-from screwkin.gait.stance import stance_of
+from screwkin.gait.remedy import with_remedy
 from screwkin.kinematics.positions import link_displacements, pose_in_base
-from screwkin.mechanism.choice import closed_mechanism
-from screwkin.mechanism.rates import block_names
 from screwkin.model.library import ROBOTS, data_folder
 from screwkin.model.robot import Robot, robot_text
 from screwkin.trajectory import Trajectory
 
 TRACED = ("numpy", "scipy", "screwkin")
+SEEN = 0.05
+"""Angle from which a foot's deviation from its plan is noted [deg]."""
 
 
 def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") -> Trajectory:
@@ -40,7 +42,8 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
         largest closure error.
 
     Raises:
-        UnreachableError, SingularError, LimitError: names limb, sample and time.
+        UnreachableError, SingularError, LimitError: names limb, sample and time, and the keys of the gait
+            with values that work.
         GaitError, InputError: the gait does not fit the robot.
 
     Example:
@@ -53,18 +56,16 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
     expect(robot, Robot, "robot", 'load_robot("NAME")')
     expect(gait, Gait, "gait", 'load_gait("NAME")')
     table = robot_text(robot)
+    gait = fitted(gait, robot)
     steps = gait.steps if steps is None else steps
-    whole = stance_of(robot)
-    drive = driven(robot)
-    mechanism, stance = closed_mechanism(drive.moving), drive.stance(whole)
-    if gait.kind == "preview":
-        planned = preview_plan(mechanism, gait, stance, steps)
-    else:
-        planned = plan(gait, stance, steps)
-    solution = positions(mechanism, planned)
-    motion = differentiate(mechanism, planned, solution.state)
-    q, qd, qdd = drive.positions(solution.state.q), drive.rates(motion.qd), drive.rates(motion.qdd)
-    tip_poses = _tip_poses(robot, planned, q)
+    try:
+        done = follow(robot, gait, steps)
+    except NoSolutionError as error:
+        raise with_remedy(error, robot, gait, steps) from None
+    drive, planned = done.drive, done.planned
+    q = drive.positions(done.solution.state.q)
+    qd, qdd = drive.rates(done.motion.qd), drive.rates(done.motion.qdd)
+    tip_poses = _tip_poses(robot, done, q)
     zmp, com, wrench, _ = ground_reaction(
         robot, planned.T_world_base, q, qd, qdd, planned.base_twist, planned.base_acceleration
     )
@@ -94,9 +95,10 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
             "gait": gait.to_dict(),
             "steps": steps,
             "boundaries": planned.boundaries.tolist(),
-            "closure": float(solution.residual.max()),
-            "sigma": dict(zip(block_names(mechanism), motion.sigma.min(axis=0).tolist(), strict=True)),
-            "notes": [*planned.notes, *drive.notes],
+            "closure": float(done.solution.residual.max()),
+            "sigma": done.sigma,
+            "notes": [*planned.notes, *drive.notes, *done.notes, *_deviations(done, tip_poses)],
+            **({"at_rest": list(drive.at_rest)} if drive.at_rest else {}),
             "versions": versions(*TRACED),
             "command": command,
         },
@@ -111,13 +113,29 @@ def _table_file(robot: Robot) -> str:
     return str(path.resolve())
 
 
-def _tip_poses(robot: Robot, planned: Plan, q: Array) -> dict[str, Array]:
-    """Pose of every tip: feet as planned, others where the joints carry them."""
-    D = link_displacements(robot, unstack(q))
+def _deviations(done: Followed, T_world_tip: Mapping[str, Array]) -> Iterator[str]:
+    """How far rotations of feet that follow are from the plan, where one sees it."""
+    for foot, free in free_rotations(done.mechanism).items():
+        if foot not in done.planned.feet:
+            continue
+        limb = done.drive.moving.limb(foot).name
+        R = done.drive.upright(foot, T_world_tip[foot])[:, :3, :3]
+        turned = done.planned.T_world_tip[foot][:, :3, :3].swapaxes(1, 2) @ R
+        lean, turn = np.degrees([np.arcsin(x.clip(-1, 1)) for x in (turned[:, 2, 1], turned[:, 1, 0])])
+        for name, angle, what in (("rx", lean, "leans sideways"), ("rz", turn, "turns about the vertical")):
+            most = np.abs(angle).max()
+            if name in free and most > SEEN:
+                yield f"{foot} {what} by up to {most:.2g} deg: no joint of {limb} can keep it from that"
+
+
+def _tip_poses(robot: Robot, done: Followed, q: Array) -> dict[str, Array]:
+    """Pose of every tip: feet as planned, others, and feet with free rotations, where joints carry them."""
+    D, planned = link_displacements(robot, unstack(q)), done.planned
     T = pose_from_array(planned.T_world_base)
+    carried = {*free_rotations(done.mechanism), *done.drive.turned}
     return {
         tip: planned.T_world_tip[tip]
-        if tip in planned.T_world_tip
+        if tip in planned.T_world_tip and tip not in carried
         else as_array(T @ pose_in_base(robot, D, tip), (len(q),))
         for tip in robot.tip_names
     }

@@ -7,16 +7,19 @@ walked from the tip to the base. Directions of the axes may be any.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.newton import newton
+from screwkin.algebra.scalar import cos, least
 from screwkin.algebra.se3 import Pose, Vector
 from screwkin.errors import InputError
 from screwkin.ik import parallel_axes, point_limb, spherical_hip
 from screwkin.ik.family import Branch, Family, Formulas
-from screwkin.kinematics.serial_chain import SerialChain, cached, distance, residual, target_of
+from screwkin.ik.starts import box, spread
+from screwkin.kinematics.serial_chain import SerialChain, cached, distance, residual, target_of, volume
 
 FAMILIES = (
     Family("spherical hip", ("No spherical hip", "no spherical wrist"), spherical_hip.recognise),
@@ -28,6 +31,10 @@ EXACT = 1e-12
 """Largest error [m and rad, norm] of a branch that counts as a solution."""
 SAME = 1e-6
 """Branches closer than this [rad] are one: what rounding leaves of a double root."""
+STILL = 1e-6
+"""Sum of (1 - cos) of the turns of a tip below which it may stand still."""
+POSITIONS = 64
+"""Positions within the limits by which axes of a tip are compared."""
 BLOCK = 4096
 """Samples computed together, which bounds the memory of a large batch."""
 
@@ -51,26 +58,33 @@ class ClosedForm:
 
     def formula(self, target: Pose | Vector) -> list[Branch]:
         """All branches of a pose or position on any scalar: positions in the limb's order, and the slack."""
-        order = slice(None, None, -1) if self.backwards else slice(None)
-        return [(*branch[:-1][order], branch[-1]) for branch in self.formulas.formula(self._given(target))]
+        return self.at(self._displacement(target))
 
-    def _given(self, target: Pose | Vector) -> Pose | Vector:
+    def at(self, wanted: Pose | Vector) -> list[Branch]:
+        """The same of the displacement of the tip link, or of a position."""
+        order = slice(None, None, -1) if self.backwards else slice(None)
+        return [(*branch[:-1][order], branch[-1]) for branch in self.formulas.formula(self._walked(wanted))]
+
+    def arrays(self, wanted: Pose | Vector, count: int) -> Array:
+        """Joint positions (k, n, count) of all branches of such displacements or positions, (count,) each."""
+        walked = self._walked(wanted)
+        if self.formulas.arrays:
+            q = self.formulas.arrays(walked)
+        else:
+            batch, sets = np.zeros(count), self.formulas.formula(walked)
+            q = np.stack([np.stack(np.broadcast_arrays(*angles, batch)[:-1]) for *angles, _ in sets])
+        return q[:, ::-1] if self.backwards else q
+
+    def _displacement(self, target: Pose | Vector) -> Pose | Vector:
+        return target if isinstance(target, Vector) else target @ self.chain.tip.inverse
+
+    def _walked(self, wanted: Pose | Vector) -> Pose | Vector:
         """What the family's formulas take: how far the tip link is displaced as it walks the chain."""
-        if isinstance(target, Vector):
-            return target
-        D = target @ self.chain.tip.inverse
-        return D.inverse if self.backwards else D
+        return wanted.inverse if self.backwards and isinstance(wanted, Pose) else wanted
 
     def _block(self, target: Array) -> Array:
-        wanted = self._given(target_of(np.asarray(target)))
-        if self.formulas.arrays:
-            q = self.formulas.arrays(wanted)
-        else:
-            batch = np.zeros(len(target))
-            sets = self.formulas.formula(wanted)
-            q = np.stack([np.stack(np.broadcast_arrays(*angles, batch)[:-1]) for *angles, _ in sets])
-        q = np.moveaxis(q, -1, 0)
-        return self.chain.wrapped(q[..., ::-1] if self.backwards else q)
+        q = self.arrays(self._displacement(target_of(np.asarray(target))), len(target))
+        return self.chain.wrapped(np.moveaxis(q, -1, 0))
 
 
 def closed_form(chain: SerialChain, position: bool = False, family: str | None = None) -> ClosedForm:
@@ -84,8 +98,10 @@ def closed_form(chain: SerialChain, position: bool = False, family: str | None =
     Raises:
         InputError: its geometry has none; the message says what each family lacks.
     """
-    rows = [row for row in FAMILIES if row.position == position and family in (None, row.name)]
     n = len(chain.screws)
+    if n in (4, 5) and not position and chain.turning.all():
+        return _with_free_tip(chain, family)
+    rows = [row for row in FAMILIES if row.position == position and family in (None, row.name)]
     fitting = [row for row in rows if row.joints == n and chain.turning.all()]
     what = f"{chain.limb} has no closed form" + (" for positions" if position else "")
     if not fitting:
@@ -103,6 +119,39 @@ def closed_form(chain: SerialChain, position: bool = False, family: str | None =
 
 
 _COUNTS = {3: "three", 6: "six"}
+
+
+def _with_free_tip(chain: SerialChain, family: str | None) -> ClosedForm:
+    """The closed form of four or five joints, from that of six of which the last turn the tip about its axes.
+
+    A branch is one of the limb's where these stand still. Of the axes that serve those are taken about which
+    the six joints are best conditioned.
+
+    Raises:
+        InputError: with no axis of the tip there is a closed form.
+    """
+    n, forms, faults = len(chain.screws), [], []
+    for free in combinations(("rx", "ry", "rz"), 6 - n):
+        longer = chain.freed(free, range(6 - n))
+        low, high = box(longer)
+        size = volume(longer, low + spread(6, POSITIONS, 0) * (high - low)).mean()
+        try:
+            forms.append((float(size), closed_form(longer, family=family)))
+        except InputError as error:
+            faults.append(str(error))
+    if not forms:
+        raise InputError(faults[-1])
+    _, form = max(forms, key=lambda rated: rated[0])
+
+    def still(branch: Branch) -> Branch:
+        turned = sum(1 - cos(angle) for angle in branch[n:-1])
+        return (*branch[:n], least(branch[-1], STILL - turned))
+
+    def arrays(D: Pose) -> Array:
+        return form.arrays(D, int(np.prod(np.shape(D.p.x))))[:, :n]
+
+    formulas = Formulas(lambda D: [still(branch) for branch in form.at(D)], arrays)
+    return ClosedForm(chain, f"{form.family}, tip free", False, False, formulas)
 
 
 @cached

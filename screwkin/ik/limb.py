@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, get_args
 
 import numpy as np
@@ -12,6 +14,8 @@ from screwkin.errors import InputError
 from screwkin.ik.methods import Method, solve_limb_arrays
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.solutions import LimbSolutions
+from screwkin.ik.system import checked_free, refuse_free_in_jax
+from screwkin.kinematics.arrays import of_shape
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.model.robot import Robot, refuse_closures
 
@@ -27,6 +31,7 @@ def limb_ik(
     *,
     settings: IkSettings | None = None,
     least_squares: bool = True,
+    free: Sequence[str] = (),
 ) -> LimbSolutions:
     """Joint positions of a limb that put its tip where it is wanted, batched.
 
@@ -44,6 +49,8 @@ def limb_ik(
         settings: tolerances, starts, damping and the like of the numeric methods. Within the tolerances a
             solution inside the limits is preferred to a more exact one outside.
         least_squares: spend time on the nearest reachable pose where the closed form has no solution.
+        free: rotations of the tip that need not be met, out of ``rx ry rz``, in the order in which they turn
+            it about its own axes: what a limb of fewer than six joints has to leave open. NumPy arrays only.
 
     Returns:
         LimbSolutions: ``.q`` (..., branches, n) best first, ``.valid .in_limits .residual .iterations``
@@ -75,8 +82,16 @@ def limb_ik(
     if is_jax(T_base_tip) or is_jax(start):
         from screwkin.ik.implicit import limb_in_jax
 
+        refuse_free_in_jax(free)
         return limb_in_jax(chain, T_base_tip, method, start, settings, least_squares)
-    return solve_limb_arrays(chain, T_base_tip, method, start, settings, least_squares)
+    if not free or np.shape(T_base_tip)[-2:] != (4, 4):
+        return solve_limb_arrays(chain, T_base_tip, method, start, settings, least_squares)
+    start = of_shape("guess", start, len(chain.names))
+    longer = SerialChain.of(robot, limb, checked_free(free))
+    start = np.concatenate([start, np.zeros((*start.shape[:-1], len(free)))], axis=-1)
+    solutions = solve_limb_arrays(longer, T_base_tip, method, start, settings, least_squares)
+    own = solutions.q[..., : len(chain.names)]
+    return replace(solutions, joint_names=chain.names, q=own, chain=chain)
 
 
 def resting(robot: Robot, chain: SerialChain) -> Array:

@@ -6,15 +6,16 @@ joints together, by Newton's method. Joints that no target needs rest at the gue
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, get_args
 
 import numpy as np
 
 from screwkin.algebra.scalar import is_jax
-from screwkin.errors import InputError, ShapeError, UnknownNameError
+from screwkin.errors import InputError, ShapeError, UnknownNameError, one_of
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.pose_solution import PoseSolution
+from screwkin.ik.system import checked_free, refuse_free_in_jax
 from screwkin.ik.whole_body import PRECISE, Method, axes_of, solve_whole_body
 from screwkin.kinematics.arrays import checked, exact_target, of_shape, one_batch
 from screwkin.model.robot import Robot, refuse_closures
@@ -28,6 +29,7 @@ def solve_pose(
     method: Method = "auto",
     *,
     settings: IkSettings | None = None,
+    free: Mapping[str, Sequence[str]] | None = None,
 ) -> PoseSolution:
     """Joint positions that put base and tips where they are wanted, batched.
 
@@ -44,6 +46,8 @@ def solve_pose(
             always that. Where it does not arrive within the limits, further starts by bounded least squares.
         settings: tolerances and number of starts; within the tolerances a solution inside the limits is
             preferred to a more exact one outside. Default: 1e-12, 64 starts.
+        free: by tip, rotations of its target pose that need not be met, as ``limb_ik`` takes them: those that
+            follow where a limb has fewer than six joints. NumPy arrays only.
 
     Returns:
         PoseSolution with ``.state .status .residual .iterations`` (..., limbs). Nothing is raised for samples
@@ -80,14 +84,17 @@ def solve_pose(
         raise InputError("no targets; name at least one tip, such as " + ", ".join(robot.tip_names[:2]))
     q = checked("guess.q", guess.q, len(robot.joints))
     batch = one_batch({labels[n]: (a, axes_of(a)) for n, a in wanted.items()} | {"guess.q": (q, 1)})
-    settings = settings or PRECISE
+    settings, open_ = settings or PRECISE, {name: checked_free(names) for name, names in (free or {}).items()}
+    for name in open_:
+        one_of("tip", name, robot.tip_names)
     if is_jax(q) or any(map(is_jax, wanted.values())):
         from screwkin.ik.implicit import pose_in_jax
 
+        refuse_free_in_jax(open_)
         rigid = {name: checked(labels[name], target) for name, target in wanted.items()}
         return pose_in_jax(robot, rigid, q, batch, method, settings)
     try:
-        return solve_whole_body(robot, wanted, q, batch, method, settings)
+        return solve_whole_body(robot, wanted, q, batch, method, settings, open_)
     except ShapeError:  # once more by the caller's names
         for name, target in wanted.items():
             exact_target(labels[name], checked(labels[name], target))

@@ -10,7 +10,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, unstack
 from screwkin.ik.system import System
-from screwkin.kinematics.serial_chain import forward
+from screwkin.kinematics.serial_chain import SerialChain, forward
 
 BEND = 0.3
 """How far the start near the guess is from it [rad]: it leaves the saddle of a straight limb."""
@@ -35,17 +35,17 @@ def later_starts(system: System, guess: Array, number: int) -> Array:
         guess: (B, n).
         number: of the map, from 0; every map has other positions.
     """
-    low, high = _box(system)
+    low, high = box(system)
     count = len(system.targets[0])
     use = np.bincount(np.concatenate(system.columns))
     common = np.flatnonzero(use > 1)
     places = SHARED if len(common) else 1
     x = np.zeros((places, POINTS, len(system.joints)))
-    x[..., common] = _spread(len(common), places, number)[:, None]
+    x[..., common] = spread(len(common), places, number)[:, None]
     nearest, far = [], np.zeros((count, places, ROUND))
     for chain, target, columns in zip(system.chains, system.targets, system.columns, strict=True):
         own = [k for k in columns if use[k] == 1]
-        x[..., own] = _spread(len(own), POINTS, number)
+        x[..., own] = spread(len(own), POINTS, number)
         q = (low + x * (high - low))[..., columns].reshape(-1, len(columns))
         tips = as_array(forward(chain.screws, unstack(q), chain.tip)[0], (len(q),))
         features = _features(tips if target.ndim == 3 else tips[:, :3, 3], system.length)
@@ -78,7 +78,7 @@ def _features(target: Array, length: float) -> Array:
     return np.concatenate([turned, target[:, :3, 3] / length], axis=1)
 
 
-def _spread(n: int, count: int, number: int) -> Array:
+def spread(n: int, count: int, number: int) -> Array:
     """The set (count, n) of that number of a sequence that fills the unit cube evenly.
 
     Source: the additive recurrence of Roberts (2018), a generalised golden ratio.
@@ -90,9 +90,9 @@ def _spread(n: int, count: int, number: int) -> Array:
     return np.asarray((0.5 + k[:, None] * ratio ** -np.arange(1.0, n + 1)) % 1.0)
 
 
-def _box(system: System) -> tuple[Array, Array]:
+def box(chain: System | SerialChain) -> tuple[Array, Array]:
     """Limits (n,) within which starts lie: where there are none, half a turn or the limbs' size each way."""
-    reach = np.where(system.turning, np.pi, system.length)
-    lower, upper = system.lower, system.upper
+    reach = np.where(chain.turning, np.pi, chain.length)
+    lower, upper = chain.lower, chain.upper
     low = np.where(np.isfinite(lower), lower, np.minimum(-reach, upper - 2 * reach))
     return low, np.where(np.isfinite(upper), upper, np.maximum(reach, low + 2 * reach))

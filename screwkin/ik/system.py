@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
 from screwkin.algebra.arrays import Array
+from screwkin.errors import InputError
 from screwkin.kinematics import limits
 from screwkin.kinematics.serial_chain import SerialChain, residual
 
@@ -99,3 +100,21 @@ class System:
     def wrapped(self, x: Array) -> Array:
         """The same positions, angles in (-pi, pi] or one turn off where only that is in the limits."""
         return limits.wrapped(x, self.lower, self.upper, self.turning)
+
+
+def checked_free(free: Sequence[str]) -> tuple[str, ...]:
+    """Rotations of a tip that are free, each named once.
+
+    Raises:
+        InputError: others than ``rx ry rz``, or one twice.
+    """
+    names = (free,) if isinstance(free, str) else tuple(free)
+    if len(set(names)) < len(names) or not set(names) <= {"rx", "ry", "rz"}:
+        raise InputError(f"free rotations {', '.join(map(str, names))}; valid: rx, ry, rz, each once")
+    return names
+
+
+def refuse_free_in_jax(free: Sequence[str] | Mapping[str, Sequence[str]]) -> None:
+    """Raise InputError where rotations are free and arrays are JAX's."""
+    if free:
+        raise InputError("free rotations of tips are for NumPy arrays; give NumPy arrays, or whole poses")

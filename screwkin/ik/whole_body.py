@@ -52,20 +52,27 @@ def solve_whole_body(
     batch: tuple[int, ...],
     method: Method,
     settings: IkSettings,
+    free: Mapping[str, tuple[str, ...]] | None = None,
 ) -> PoseSolution:
     """As ``solve_pose``, for NumPy arrays that broadcast to a batch; a target for the base is given.
+
+    Free rotations are virtual joints, whose positions stand behind those of all joints.
 
     Raises:
         ShapeError: NaN or infinity, or a pose that is not rigid.
     """
-    count, size = math.prod(batch), len(robot.joints)
-    q = np.array(np.broadcast_to(guess, (*batch, size))).reshape(count, size)
+    count, size, open_ = math.prod(batch), len(robot.joints), free or {}
+    q = np.zeros((count, size + (3 * len(robot.limbs) if open_ else 0)))
+    q[:, :size] = np.broadcast_to(guess, (*batch, size)).reshape(count, size)
     flat = {}
     for name, target in targets.items():
         shape = target.shape[target.ndim - axes_of(target) :]
         flat[name] = np.broadcast_to(target, (*batch, *shape)).reshape(count, *shape)
     base = flat.pop("base")
-    limbs = [(name, SerialChain.of(robot, name), target) for name, target in flat.items()]
+    limbs = [
+        (name, SerialChain.of(robot, name, open_.get(name, ()) if target.ndim == 3 else ()), target)
+        for name, target in flat.items()
+    ]
     parts: dict[str, Array] = {
         name: np.zeros((count, len(limbs)), dtype=kind) for name, kind in COUNTED.items()
     }
@@ -75,7 +82,7 @@ def solve_whole_body(
         solve = _by_closed_form if alone else _by_newton
         solve(_Work(base, q, parts, settings), [limbs[row] for row in rows], rows)
     counts = [parts[name].reshape(*batch, len(limbs)) for name in COUNTED]
-    state = State(base.reshape(*batch, 4, 4), q.reshape(*batch, size))
+    state = State(base.reshape(*batch, 4, 4), q[:, :size].reshape(*batch, size))
     return PoseSolution(state, tuple(chain.limb for _, chain, _ in limbs), *counts)
 
 

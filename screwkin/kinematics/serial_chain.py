@@ -75,14 +75,43 @@ class SerialChain:
         return SerialChain, tuple(getattr(self, f.name) for f in fields(self) if f.init)
 
     @classmethod
-    def of(cls, robot: Robot, limb: str) -> SerialChain:
+    def of(cls, robot: Robot, limb: str, free: tuple[str, ...] = ()) -> SerialChain:
         """The chain of a limb, by its name or its tip's.
+
+        Args:
+            robot: the robot.
+            limb: the limb.
+            free: rotations of the tip that are free, see ``freed``; their virtual joints have places in q
+                behind those of all joints, three to a limb.
 
         Raises:
             UnknownNameError: no such limb.
             InputError: one of its joints is coupled to another joint.
         """
-        return _chain(robot, robot.limb(limb).name)
+        name = robot.limb(limb).name
+        return _freed_chain(robot, name, free) if free else _chain(robot, name)
+
+    def freed(self, free: tuple[str, ...], places: Sequence[int]) -> SerialChain:
+        """The chain with virtual joints behind its last one, about the tip's own axes through the tip.
+
+        A limb that takes its tip to a pose but for rotations R_a R_b about these axes is a longer one that
+        takes it to that pose: its virtual joints turn back by R_b, then by R_a. They have no limits.
+
+        Args:
+            free: names out of ``rx ry rz``, in the order in which they turn.
+            places: indices of the virtual joints in q, likewise.
+        """
+        axes = {"rx": self.tip.R.x, "ry": self.tip.R.y, "rz": self.tip.R.z}
+        back, ends = free[::-1], np.full(len(free), np.inf)
+        return replace(
+            self,
+            names=(*self.names, *(f"{self.limb}.{name}" for name in back)),
+            joints=(*self.joints, *places[::-1]),
+            screws=(*self.screws, *(Screw(axes[name], self.tip.p) for name in back)),
+            lower=np.concatenate([self.lower, -ends]),
+            upper=np.concatenate([self.upper, ends]),
+            turning=np.concatenate([self.turning, ends > 0]),
+        )
 
     @property
     def reversed(self) -> SerialChain:
@@ -177,6 +206,12 @@ def _chain(robot: Robot, limb: str) -> SerialChain:
     )
 
 
+@kept
+def _freed_chain(robot: Robot, limb: str, free: tuple[str, ...]) -> SerialChain:
+    first = len(robot.joints) + 3 * [one.name for one in robot.limbs].index(limb)
+    return _chain(robot, limb).freed(free, [first + "xyz".index(name[1]) for name in free])
+
+
 def _number(x: Scalar) -> float:
     return 0.0 if is_symbolic(x) else float(x)
 
@@ -248,6 +283,14 @@ def miss(chain: SerialChain, q: Sequence[Scalar], target: Pose | Vector) -> Scal
     """Norm of the residual [m and rad] on any scalar; large angles are given by their chord."""
     half, far = separation(chain, q, target)
     return sqrt(4 * half + far)
+
+
+def volume(chain: SerialChain, q: Array) -> Array:
+    """(B,) size of the determinant of six joints' screws at q (B, 6), velocities over the limb's size."""
+    tip, columns = forward(chain.screws, unstack(q), chain.tip)
+    J = as_array([at(tip.p, column) for column in columns], (len(q),)).astype(float)
+    J[..., 3:] /= chain.length
+    return np.asarray(np.abs(np.linalg.det(J)))
 
 
 def distance(chain: SerialChain, q: Array, target: Array) -> Array:

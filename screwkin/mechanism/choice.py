@@ -23,6 +23,7 @@ from screwkin.mechanism.mechanism import Mechanism, VirtualChain, unchosen
 from screwkin.mechanism.network import coupling_twists, network_of_twists
 from screwkin.mechanism.scaling import characteristic_length, referenced
 from screwkin.model.robot import Robot
+from screwkin.model.state import reference_posture
 
 RANK_TOLERANCE = 1e-6
 """Smallest singular value, relative to the largest, of length-normalised screws still independent."""
@@ -57,9 +58,9 @@ def independent(N: Array, order: Sequence[int]) -> list[int]:
 def preference(mechanism: Mechanism) -> list[int]:
     """Columns in the order in which they would rather be secondary.
 
-    With virtual chains: joints of one limb, then the rotations of tips, then joints that limbs share, then
-    the translations of tips, the waist last; a joint that no circuit needs never follows. Without: the last
-    joint of the table first, so that the first ones drive.
+    With virtual chains: joints of one limb, then the rotations of tips, of each chain the last first, then
+    joints that limbs share, then the translations of tips, the waist last; a joint that no circuit needs
+    never follows. Without: the last joint of the table first, so that the first ones drive.
     """
     real = [mechanism.position[name] for name in mechanism.robot.joint_names]
     if not mechanism.chains:
@@ -70,16 +71,10 @@ def preference(mechanism: Mechanism) -> list[int]:
     own = [column for column in real if column not in shared]
     tips = [chain for chain in mechanism.chains if chain.limb]
     waist = [name for chain in mechanism.chains if not chain.limb for name in chain.names]
-    turning = [n for chain in tips for n in chain.names if n.split(".")[1][0] == "r"]
+    turning = [n for chain in tips for n in reversed(chain.names) if n.split(".")[1][0] == "r"]
     moving = [n for chain in tips for n in chain.names if n.split(".")[1][0] == "p"]
     rotations, others = ([mechanism.position[n] for n in names] for names in (turning, (*moving, *waist)))
     return own + rotations + shared + others
-
-
-def reference_posture(robot: Robot) -> tuple[float, ...]:
-    """q at which the choice is checked: posture ``home``, else the first posture, else all zero."""
-    named = {posture.name: posture.q for posture in robot.postures}
-    return named.get("home") or (robot.postures[0].q if robot.postures else (0.0,) * len(robot.joints))
 
 
 def closed_mechanism(robot: Robot, primary: Sequence[str] | None = None) -> Mechanism:

@@ -17,6 +17,7 @@ from screwkin.algebra.pattern import components
 from screwkin.algebra.se3 import IDENTITY, Pose
 from screwkin.mechanism import graph as graphs
 from screwkin.mechanism.chains import SPATIAL, check_chain, held_pose
+from screwkin.mechanism.followers import tip_chain
 from screwkin.mechanism.graph import CouplingGraph
 from screwkin.model.display import html_table, listing
 from screwkin.model.robot import Limb, Robot
@@ -198,7 +199,7 @@ class Mechanism:
 def virtual_chains(robot: Robot) -> tuple[VirtualChain, ...]:
     """The waist's chain (floating base) and one for every limb's tip."""
     chains = [VirtualChain(WAIST, SPATIAL, None)] if robot.base == "floating" else []
-    chains += [VirtualChain(limb.tip, check_chain(limb.chain), limb) for limb in robot.limbs]
+    chains += [VirtualChain(limb.tip, check_chain(tip_chain(robot, limb.name)), limb) for limb in robot.limbs]
     return tuple(chains)
 
 

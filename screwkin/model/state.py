@@ -68,3 +68,9 @@ def home(robot: Robot, posture: str = "home") -> State:
     T = np.eye(4)
     T[2, 3] = chosen.base_height
     return State(T, np.array(chosen.q, dtype=float))
+
+
+def reference_posture(robot: Robot) -> tuple[float, ...]:
+    """q at which a robot is examined: posture ``home``, else the first posture, else all zero."""
+    named = {posture.name: posture.q for posture in robot.postures}
+    return named.get("home") or (robot.postures[0].q if robot.postures else (0.0,) * len(robot.joints))

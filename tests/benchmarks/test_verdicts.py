@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import json
+from dataclasses import asdict, replace
+from pathlib import Path
 
 import screwkin as sk
-from benchmarks.verdicts import Outcome, Walk, markdown, walks
+from benchmarks.verdicts import Outcome, Walk, done, markdown, walks
 
 
 def test_the_list_holds_a_hundred_different_walks_of_three_robots() -> None:
@@ -30,3 +32,12 @@ def test_verdicts_that_differ_are_listed_with_their_reasons() -> None:
     )
     assert "mujoco, rigid servos" in text
     assert "0.70 mm" in text
+
+
+def test_a_run_that_ended_early_goes_on_from_its_last_finished_walk(tmp_path: Path) -> None:
+    walk = Walk("one", "walk", 1.0, None)
+    row = Outcome(walk, "rigid", "pybullet", False, ("it fell",), None, 40.0)
+    file = tmp_path / "verdicts.jsonl"
+    assert done(file) == []
+    file.write_text(json.dumps([asdict(row)]) + '\n[{"walk": {"rob')
+    assert done(file) == [row]

@@ -15,9 +15,10 @@ from screwkin.gait.files import load_gait
 from screwkin.gait.optimise import optimise_waist, waist_table
 from screwkin.gait.plan import plan
 from screwkin.gait.record import gait_from_dict
+from screwkin.gait.stance import stance_of
 from screwkin.gait.waist import waist_path
 from screwkin.gait.waist_layout import SHAPE, Layout
-from screwkin.gait.walk import stance_of, walk
+from screwkin.gait.walk import walk
 from screwkin.model.table import load_robot
 
 KNEES = ("right_knee", "left_knee")

@@ -2,7 +2,7 @@
 
 One field of trajectory, table or verdict is changed at random, by a forger who computes all anew that can be
 computed without a simulator: hashes, margins and speeds. Either ``send`` refuses, or what reaches the servos
-is within a tick what it was. All 10,000 changes, in half an hour:
+is within a tick what it was. All 10,000 changes, in some minutes:
 
     python -m pytest -m slow tests/laws/test_what_is_played.py
 """
@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Callable, Iterator
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -21,10 +22,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import screwkin as sk
+from screwkin.analysis import readiness
+from screwkin.analysis.account import recorded_robot
 from screwkin.analysis.readiness import Ready, ready
 from screwkin.errors import ScrewkinError
 from screwkin.model.library import find_robot
 from screwkin.trajectory import Trajectory, load_trajectory
+from tests import verdicts
 from tests.verdicts import passing_data
 
 ARRAYS = ["time", "q", "qd", "qdd", "T_world_base", "base_twist", "base_acceleration", "com", "zmp", "margin"]
@@ -72,8 +76,28 @@ class Played:
 
 
 @pytest.fixture(scope="module")
-def played(tmp_path_factory: pytest.TempPathFactory) -> Played:
-    return Played(tmp_path_factory.mktemp("played"))
+def played(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Played]:
+    """A robot read twice from the same text is the same object, so that its programs are traced once."""
+    known: dict[tuple[str, Any], sk.Robot] = {}
+
+    def once(key: tuple[str, Any], read: Callable[[Any], sk.Robot], source: Any) -> sk.Robot:
+        if key not in known:
+            if len(known) > 8:
+                known.clear()
+            known[key] = read(source)
+        return known[key]
+
+    def loaded(source: str | Path) -> sk.Robot:
+        path = Path(source)
+        return once((str(source), path.read_bytes() if path.is_file() else None), sk.load_robot, source)
+
+    def recorded(trajectory: Trajectory) -> sk.Robot:
+        return once(("recorded", str(trajectory.meta["robot"])), recorded_robot, trajectory)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(readiness, "load_robot", loaded)
+        patch.setattr(verdicts, "recorded_robot", recorded)
+        yield Played(tmp_path_factory.mktemp("played"))
 
 
 def changed_trajectory(played: Played, draw: st.DataObject) -> tuple[Trajectory, str]:

@@ -1,0 +1,82 @@
+"""A plan and the joints that follow it: all of a walk but its balance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from screwkin.errors import LimitError, SingularError, UnreachableError
+from screwkin.gait.driven import Driven, driven
+from screwkin.gait.lengths import lengths_of
+from screwkin.gait.plan import Plan, plan
+from screwkin.gait.preview_plan import preview_plan
+from screwkin.gait.realise import differentiate, positions
+from screwkin.gait.record import Gait
+from screwkin.gait.stance import stance_of
+from screwkin.ik.numeric import IkSettings
+from screwkin.ik.pose_solution import PoseSolution
+from screwkin.ik.whole_body import PRECISE
+from screwkin.mechanism.choice import closed_mechanism
+from screwkin.mechanism.joint_motion import JointMotion
+from screwkin.mechanism.mechanism import Mechanism
+from screwkin.mechanism.rates import block_names
+from screwkin.model.robot import Robot
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """A plan and the joint motion that follows it.
+
+    Attributes:
+        drive: what moves.
+        mechanism: of what moves.
+        planned: T samples.
+        solution: joint positions.
+        motion: joint rates and accelerations.
+        notes: why limbs rest.
+    """
+
+    drive: Driven
+    mechanism: Mechanism
+    planned: Plan
+    solution: PoseSolution
+    motion: JointMotion
+    notes: tuple[str, ...]
+
+    @property
+    def sigma(self) -> dict[str, float]:
+        """Least singular value of every block."""
+        names = block_names(self.mechanism)
+        return dict(zip(names, self.motion.sigma.min(axis=0).tolist(), strict=True))
+
+
+def follow(robot: Robot, gait: Gait, steps: int, settings: IkSettings = PRECISE) -> Followed:
+    """Plan a gait and solve for the joints; an arm that cannot follow its hand rests at home.
+
+    Args:
+        robot: with two legs, soles and a ``home`` posture.
+        gait: fitted to the robot.
+        steps: number of steps, at least 1.
+        settings: of the inverse kinematics.
+
+    Raises:
+        UnreachableError, SingularError, LimitError: a leg cannot follow; names limb, sample and time.
+        GaitError, InputError, NoSolutionError: as ``plan`` and ``preview_plan``.
+    """
+    whole, at_rest, notes = stance_of(robot), tuple[str, ...](), tuple[str, ...]()
+    while True:
+        drive = driven(robot, at_rest)
+        mechanism, stance = closed_mechanism(drive.moving), drive.stance(whole)
+        try:
+            if gait.kind == "preview":
+                planned = preview_plan(mechanism, gait, stance, steps, settings)
+            else:
+                planned = plan(gait, stance, steps)
+            solution = positions(mechanism, planned, settings=settings)
+            motion = differentiate(mechanism, planned, solution.state)
+        except (UnreachableError, SingularError, LimitError) as error:
+            if error.limb not in [limb.name for limb in robot.limbs if limb.kind != "leg"]:
+                raise
+            drop = f"hand_drop is {gait.hand_drop:g}, at home {lengths_of(robot)['arm']:.3g}"
+            at_rest, notes = (*at_rest, error.limb), (*notes, f"{error.limb} rests: {error}; {drop}")
+        else:
+            return Followed(drive, mechanism, planned, solution, motion, notes)

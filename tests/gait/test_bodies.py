@@ -1,0 +1,84 @@
+"""Whole bodies walk, whatever their joints: legs of four to seven, arms of any number, waists, necks."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+
+import numpy as np
+import pytest
+
+import screwkin as sk
+from screwkin.errors import UnreachableError
+from screwkin.model.robot import Robot
+from screwkin.model.table import parse_robot
+from tests.bodies import LEG, SEVEN, humanoid
+
+GAIT = sk.load_gait("walk").replace(
+    rate=20, Tc=1.5, stride=0.1, waist_height=0.48, hand_drop=0.38, sway=1.9, lift=0.02
+)
+BODIES = {
+    "six": {},
+    "no yaw": {"leg": LEG[1:], "waist": "yaw"},
+    "no ankle roll": {"leg": LEG[:-1]},
+    "neither": {"leg": LEG[1:-1]},
+    "seven": {"arm": SEVEN, "waist": "yaw"},
+}
+
+
+@cache
+def robot_of(name: str) -> Robot:
+    return parse_robot(humanoid(**BODIES[name]))
+
+
+@cache
+def walked(name: str) -> sk.Trajectory:
+    return sk.walk(robot_of(name), GAIT, 2)
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_feet_stand_where_they_are_planned_and_rates_are_slopes(name: str) -> None:
+    robot, walk = robot_of(name), walked(name)
+    six = walked("six")
+    for foot in walk.feet:
+        np.testing.assert_allclose(
+            walk.T_world_tip[foot][:, :3, 3], six.T_world_tip[foot][:, :3, 3], atol=1e-12
+        )
+        own = sk.frame_pose(robot, sk.State(walk.T_world_base, walk.q), foot)
+        np.testing.assert_allclose(own, walk.T_world_tip[foot], atol=1e-9)
+    h = walk.time[1] - walk.time[0]
+    for value, rate in ((walk.q, walk.qd), (walk.qd, walk.qdd)):
+        slope = (value[2:] - value[:-2]) / (2 * h)
+        assert np.quantile(np.abs(slope - rate[1:-1]), 0.9) < 0.03 * max(1.0, np.abs(rate).max())
+
+
+@pytest.mark.parametrize("name", ["six", "no yaw", "seven"])
+def test_robots_with_level_soles_keep_their_balance(name: str) -> None:
+    assert walked(name).margin.min() > 0.005
+    assert np.ptp(walked(name).q[:, robot_of(name).joint_names.index("right_elbow_pitch")]) > 0.01
+
+
+@pytest.mark.parametrize("name", ["no ankle roll", "neither"])
+def test_a_sole_that_leans_is_told_and_stands_on_its_edge(name: str) -> None:
+    walk = walked(name)
+    lean = np.degrees(np.arcsin(np.abs(walk.T_world_tip["right_foot"][:, 2, 1]).max()))
+    remark = next(
+        note for note in walk.meta["notes"] if note.startswith("right_foot leans sideways by up to")
+    )
+    assert float(re.findall(r"[\d.]+", remark)[0]) == pytest.approx(lean, rel=0.06)
+    assert walk.margin.min() < 0
+    np.testing.assert_allclose(sk.zmp(robot_of(name), walk).margin, walk.margin, atol=1e-9)
+
+
+def test_a_leg_without_yaw_names_what_a_turn_needs() -> None:
+    turning = GAIT.replace(turn=0.2)
+    with pytest.raises(
+        UnreachableError, match=r"no joint of right_leg .* a turn needs one.* set turn = 0 \(now 0\.2"
+    ):
+        sk.walk(robot_of("no yaw"), turning, 2)
+    assert sk.walk(robot_of("no ankle roll"), turning, 2).samples
+
+
+def test_arms_of_seven_joints_swing_alike_in_every_process() -> None:
+    again = sk.walk(parse_robot(humanoid(**BODIES["seven"])), GAIT, 2)
+    np.testing.assert_array_equal(again.q, walked("seven").q)

@@ -1,0 +1,125 @@
+"""Limbs of four and five joints: closed forms by a tip that is free to turn, and poses met but for that."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import screwkin as sk
+from screwkin.algebra.se3 import as_array, unstack
+from screwkin.errors import InputError, UnknownNameError
+from screwkin.ik.closed import closed_form
+from screwkin.ik.methods import solve_limb
+from screwkin.ik.numeric import IkSettings
+from screwkin.kinematics.serial_chain import SerialChain, forward
+from screwkin.kinematics.status import Status
+from screwkin.mechanism.followers import followers
+from screwkin.model.robot import Robot
+from screwkin.model.table import parse_robot
+from tests.bodies import LEG, humanoid
+from tests.ik.legs import apart, offset_leg, random_tip, spherical_leg, unit
+
+LEGS = {"no yaw": LEG[1:], "no ankle roll": LEG[:-1], "neither": LEG[1:-1]}
+
+
+@cache
+def robot_of(name: str) -> Robot:
+    return parse_robot(humanoid(LEGS[name], arm=(), ahead=0.03))
+
+
+def drawn(robot: Robot, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Positions of the right leg within its limits, and the poses of its tip in the base frame."""
+    chain = SerialChain.of(robot, "right_leg")
+    own = np.random.default_rng(1).uniform(chain.lower, chain.upper, (count, len(chain.joints)))
+    q = np.tile(sk.home(robot).q, (count, 1))
+    q[:, list(chain.joints)] = own
+    return own, sk.frame_pose(robot, sk.State(np.eye(4), q), "right_foot")
+
+
+@pytest.mark.parametrize("name", LEGS)
+def test_every_pose_of_a_leg_s_own_is_solved_with_the_branch_that_made_it(name: str) -> None:
+    robot = robot_of(name)
+    own, T = drawn(robot, 300)
+    solutions = sk.limb_ik(robot, "right_leg", T)
+    assert solutions.method == "closed"
+    assert (solutions.status == Status.CONVERGED).all()
+    assert solutions.residual[solutions.valid].max() < 1e-12
+    assert np.nanmin(apart(solutions.q, own[:, None]), axis=1).max() < 1e-7
+    pose = sk.solve_pose(robot, {"base": np.eye(4), "right_foot": T})
+    assert pose.ok
+    np.testing.assert_allclose(pose.state.q[:, : own.shape[1]], solutions.best, atol=1e-9)
+
+
+def random_leg(seed: int, kind: str) -> SerialChain:
+    """Axes in general position but for what the kind says; five joints."""
+    rng = np.random.default_rng(seed)
+    axes, points = unit(rng, 5), rng.normal(size=(5, 3))
+    middle = slice(2, 5) if kind == "yaw, roll, three pitches" else slice(1, 4)
+    axes[middle] = axes[middle][0] * rng.choice([-1.0, 1.0], size=(3, 1))
+    leg = offset_leg()
+    return type(leg)(axes, points, random_tip(rng)).chain()
+
+
+@pytest.mark.parametrize("kind", ["yaw, roll, three pitches", "roll, three pitches, roll"])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
+def test_three_parallel_axes_and_two_others_have_a_closed_form(kind: str, seed: int) -> None:
+    chain = random_leg(seed, kind)
+    q = np.random.default_rng(seed).uniform(-np.pi, np.pi, (100, 5))
+    T = as_array(forward(chain.screws, unstack(q), chain.tip)[0], (100,))
+    solved = solve_limb(chain, T, "auto", np.zeros((100, 5)), IkSettings(), (100,))
+    assert solved.method == "closed"
+    assert np.nanmin(apart(solved.q, q[:, None]), axis=1).max() < 1e-6
+    assert solved.residual[solved.valid].max() < 1e-11
+
+
+@pytest.mark.parametrize("name", LEGS)
+def test_a_free_rotation_follows_and_all_else_is_met(name: str) -> None:
+    robot = robot_of(name)
+    free = followers(robot, "right_leg")
+    T = np.tile(sk.frame_pose(robot, sk.home(robot), "right_foot"), (50, 1, 1))
+    T[:, :3, 3] += np.random.default_rng(2).uniform((-0.05, -0.05, 0.0), 0.05, (50, 3))
+    solution = sk.solve_pose(robot, {"right_foot": T}, free={"right_foot": free})
+    assert solution.ok
+    assert solution.state.q.shape == (50, len(robot.joints))
+    got = sk.frame_pose(robot, solution.state, "right_foot")
+    np.testing.assert_allclose(got[:, :3, 3], T[:, :3, 3], atol=1e-12)
+    turned = Rotation.from_matrix(got[:, :3, :3]).as_euler("ZYX" if free == ("rx",) else "YXZ")
+    imposed = {("rz",): [0, 1], ("rx",): [0, 1], ("rx", "rz"): [0]}[free]
+    np.testing.assert_allclose(turned[:, imposed], 0.0, atol=1e-12)
+    own = sk.limb_ik(robot, "right_leg", np.linalg.inv(sk.home(robot).T_world_base) @ T, free=free)
+    assert own.joint_names == SerialChain.of(robot, "right_leg").names
+    np.testing.assert_allclose(own.best, solution.state.q[:, : own.q.shape[-1]], atol=1e-12)
+    newton = sk.solve_pose(robot, {"right_foot": T}, method="newton", free={"right_foot": free})
+    np.testing.assert_allclose(newton.state.q, solution.state.q, atol=1e-9)
+
+
+def test_a_leg_of_six_joints_with_a_free_rotation_uses_it() -> None:
+    robot = sk.load_robot("bioloid")
+    T = sk.frame_pose(robot, sk.home(robot), "right_foot")
+    T[:3, :3] = Rotation.from_euler("z", 3.0).as_matrix()
+    one = sk.solve_pose(robot, {"right_foot": T}, free={"right_foot": ("rz",)})
+    assert one.ok
+    np.testing.assert_allclose(sk.frame_pose(robot, one.state, "right_foot")[:3, 3], T[:3, 3], atol=1e-11)
+
+
+def test_wrong_names_of_free_rotations_are_refused() -> None:
+    robot = robot_of("no yaw")
+    T = np.eye(4)
+    with pytest.raises(InputError, match="valid: rx, ry, rz"):
+        sk.limb_ik(robot, "right_leg", T, free=("px",))
+    with pytest.raises(UnknownNameError, match="unknown tip 'toe'"):
+        sk.solve_pose(robot, {"right_foot": T}, free={"toe": ("rz",)})
+    with pytest.raises(InputError, match="NumPy arrays"):
+        sk.limb_ik(robot, "right_leg", jnp.eye(4), free=("rz",))
+
+
+def test_a_limb_without_closed_form_says_what_its_longer_relatives_lack() -> None:
+    leg = spherical_leg()
+    rng = np.random.default_rng(0)
+    chain = type(leg)(unit(rng, 5), rng.normal(size=(5, 3)), random_tip(rng)).chain()
+    with pytest.raises(InputError, match="no closed form"):
+        closed_form(chain)
