@@ -134,3 +134,10 @@ def test_a_free_swing_with_coupled_joints_keeps_its_energy(engine):
     assert kinetic > 0.1
     assert energy(last.q, last.qd) == pytest.approx(energy(first.q, first.qd), abs=0.02 * kinetic)
     one.close()
+
+
+def test_in_mujoco_a_base_link_may_be_called_world_as_in_many_urdf_files():
+    robot = sk.robot_from_text(ARM.replace('"stand"', '"world"'))
+    one = MuJoCoBackend(robot)
+    np.testing.assert_allclose(one.reset(sk.State(np.eye(4), np.array([0.3]))).q, [0.3])
+    one.close()
