@@ -18,13 +18,14 @@ from screwkin.model.dh import CONVENTIONS, Convention
 from screwkin.model.dh_csv import dh_text, load_dh
 from screwkin.model.dh_robot import robot_from_dh
 from screwkin.model.robot import Robot
+from screwkin.model.srdf import srdf_from_robot
 from screwkin.model.table import load_robot
 from screwkin.model.toml_out import robot_toml
 from screwkin.model.urdf import urdf_from_robot
 from screwkin.model.urdf_in import load_urdf
 from screwkin.model.urdf_joints import MIMICS, Mimic
 
-_FRAMES = "URDF holds no limbs, postures and servos; tips and soles are frames fixed to their links"
+_SRDF = "limbs, soles and postures stand in the SRDF file beside; URDF and SRDF hold no servos and parameters"
 FORMATS = (".toml", ".urdf", ".csv")
 
 
@@ -62,6 +63,9 @@ def convert(
     text, lost = _written(robot, target, chosen)
     with atomic_write(target) as file:
         file.write(text)
+    if target.suffix.lower() == ".urdf" and (robot.limbs or robot.postures):
+        with atomic_write(target.with_suffix(".srdf")) as file:
+            file.write(srdf_from_robot(robot))
     remarks += lost
     if as_json:
         data = {"robot": robot.name, "file": str(target), "joints": robot.joint_names, "remarks": remarks}
@@ -97,7 +101,7 @@ def _written(robot: Robot, target: Path, convention: Convention) -> tuple[str, l
     }
     lost = {
         ".toml": [],
-        ".urdf": [_FRAMES] if robot.limbs else [],
+        ".urdf": [_SRDF] if robot.limbs or robot.postures else [],
         ".csv": ["DH tables hold the chains' geometry only: no masses, limits, soles and closures"],
     }
     if robot.coupled and suffix == ".csv":

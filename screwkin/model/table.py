@@ -44,7 +44,7 @@ def load_robot(name_or_path: str | Path, symbolic: bool = False) -> Robot:
 
         _only_numbers(symbolic, str(path), "a DH table")
         return robot_from_dh(load_dh(path), path.stem, str(path))
-    return _read(read_text(path, TableError), str(path), symbolic)
+    return _read(read_text(path, TableError), str(path), symbolic, path)
 
 
 def robot_from_text(text: str, name: str = "<text>", symbolic: bool = False) -> Robot:
@@ -74,13 +74,14 @@ def robot_from_text(text: str, name: str = "<text>", symbolic: bool = False) -> 
 parse_robot = Robot.from_text
 
 
-def _read(text: str, name: str, symbolic: bool) -> Robot:
-    """The robot of a text in TOML or XML; its remarks are warnings to its caller's caller."""
+def _read(text: str, name: str, symbolic: bool, path: Path | None = None) -> Robot:
+    """The robot of a text in TOML or XML, of a file or not; remarks are warnings to its caller's caller."""
     if text.lstrip("\ufeff \t\r\n").startswith("<"):
+        from screwkin.model.srdf import find_srdf
         from screwkin.model.urdf_in import parse_urdf
 
         _only_numbers(symbolic, name, "URDF")
-        read = parse_urdf(text, name)
+        read = parse_urdf(text, name, srdf=find_srdf(path) if path else None)
         robot, remarks = read.robot, read.remarks
     else:
         robot = parse_robot(text, name, symbolic)

@@ -110,11 +110,11 @@ def test_what_cannot_be_kept_is_told():
         ("box", "collision"),
     ]
     assert np.isinf(found.robot.joints[0].velocity)
+    assert [(frame.name, frame.link) for frame in found.robot.frames] == [("tool_tip", "upper")]
     told = "\n".join(found.remarks)
     for remark in (
         "left out: transmission",
         "renamed, as a table needs plain names: 'tool tip' to tool_tip",
-        "merged, as fixed to one another: tool tip into upper",
         "mesh files not found, so neither seen nor measured: a.stl",
         "velocity not above 0, taken as no limit: shoulder",
         "URDF names no limbs, soles and postures",
