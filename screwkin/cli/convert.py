@@ -11,15 +11,17 @@ import typer
 from screwkin.analysis.chains import derived_tables
 from screwkin.cli.options import AsJson
 from screwkin.cli.output import print_json, remark
-from screwkin.errors import InputError, one_of
+from screwkin.errors import InputError, TableError, one_of
 from screwkin.files import atomic_write
 from screwkin.model.coupled import coupling_text
 from screwkin.model.dh import CONVENTIONS, Convention
 from screwkin.model.dh_csv import dh_text, load_dh
 from screwkin.model.dh_robot import robot_from_dh
+from screwkin.model.mjcf_in import is_mjcf, parse_mjcf
 from screwkin.model.robot import Robot
 from screwkin.model.srdf import srdf_from_robot
 from screwkin.model.table import load_robot
+from screwkin.model.toml import read_text
 from screwkin.model.toml_out import robot_toml
 from screwkin.model.urdf import urdf_from_robot
 from screwkin.model.urdf_in import load_urdf
@@ -31,7 +33,10 @@ FORMATS = (".toml", ".urdf", ".csv")
 
 def convert(
     source: Annotated[
-        str, typer.Argument(metavar="IN", help="A bundled robot's name, or a .toml, .urdf or DH .csv file.")
+        str,
+        typer.Argument(
+            metavar="IN", help="A bundled robot's name, or a .toml, .urdf, MJCF .xml or DH .csv file."
+        ),
     ],
     target: Annotated[Path, typer.Argument(metavar="OUT", help="The .toml, .urdf or DH .csv file to write.")],
     convention: Annotated[
@@ -80,8 +85,9 @@ def convert(
 def _read(source: str, repair: bool, mimic: Mimic) -> tuple[Robot, list[str]]:
     """The robot of a name or file, and remarks on what its format leaves open."""
     suffix = Path(source).suffix.lower()
-    if suffix == ".urdf":
-        read = load_urdf(source, repair, mimic)
+    if suffix in (".urdf", ".xml"):
+        text = read_text(Path(source), TableError)
+        read = parse_mjcf(text, source, repair) if is_mjcf(text) else load_urdf(source, repair, mimic)
         return read.robot, list(read.remarks)
     if repair or mimic == "free":
         raise InputError(f"--repair and --mimic are for a URDF that is read, and {source} is none; edit it")

@@ -1,4 +1,4 @@
-"""Robots from files and texts of every format: screw tables, URDF, Denavit-Hartenberg tables."""
+"""Robots from files and texts of every format: screw tables, URDF, MJCF, Denavit-Hartenberg tables."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from screwkin.model.toml import read_text
 
 
 def load_robot(name_or_path: str | Path, symbolic: bool = False) -> Robot:
-    """The robot of a bundled name, or of a file's path: ``.toml``, ``.urdf``, or a DH ``.csv``.
+    """The robot of a bundled name, or of a file: ``.toml``, ``.urdf``, MJCF ``.xml``, or a DH ``.csv``.
 
     What a URDF file says and a table cannot is a warning (``RobotRemark``), as is an inertia that breaks the
     triangle inequality; ``model.urdf_in.load_urdf`` returns the remarks.
@@ -48,7 +48,7 @@ def load_robot(name_or_path: str | Path, symbolic: bool = False) -> Robot:
 
 
 def robot_from_text(text: str, name: str = "<text>", symbolic: bool = False) -> Robot:
-    """The robot of a text: a screw table in TOML, or URDF, which begins with ``<``.
+    """The robot of a text: a screw table in TOML, or URDF or MJCF, which begin with ``<``.
 
     Args:
         text: the content of such a file.
@@ -77,11 +77,15 @@ parse_robot = Robot.from_text
 def _read(text: str, name: str, symbolic: bool, path: Path | None = None) -> Robot:
     """The robot of a text in TOML or XML, of a file or not; remarks are warnings to its caller's caller."""
     if text.lstrip("\ufeff \t\r\n").startswith("<"):
+        from screwkin.model.mjcf_in import is_mjcf, parse_mjcf
         from screwkin.model.srdf import find_srdf
         from screwkin.model.urdf_in import parse_urdf
 
         _only_numbers(symbolic, name, "URDF")
-        read = parse_urdf(text, name, srdf=find_srdf(path) if path else None)
+        if is_mjcf(text):
+            read = parse_mjcf(text, name)
+        else:
+            read = parse_urdf(text, name, srdf=find_srdf(path) if path else None)
         robot, remarks = read.robot, read.remarks
     else:
         robot = parse_robot(text, name, symbolic)
