@@ -10,7 +10,7 @@ import typer
 
 from screwkin.analysis.chains import derived_tables
 from screwkin.cli.options import AsJson
-from screwkin.cli.output import print_json, remark
+from screwkin.cli.output import print_json, remark, shortened
 from screwkin.errors import InputError, TableError, one_of
 from screwkin.files import atomic_write
 from screwkin.model.coupled import coupling_text
@@ -78,7 +78,7 @@ def convert(
     else:
         print(f"{target}: {robot.name}, {len(robot.links)} links, {len(robot.joints)} joints")
         for text in remarks:
-            remark(f"remark: {text}")
+            remark(shortened(f"remark: {text}"))
     return 0
 
 

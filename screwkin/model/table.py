@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
-from screwkin.errors import InputError, RobotRemark, TableError, expect
+from screwkin.errors import InputError, RobotRemark, TableError, UnknownNameError, expect
 from screwkin.model.inertias import impossible
 from screwkin.model.library import find_robot
 from screwkin.model.robot import Robot
@@ -20,7 +20,7 @@ def load_robot(name_or_path: str | Path, symbolic: bool = False) -> Robot:
     triangle inequality; ``model.urdf_in.load_urdf`` returns the remarks.
 
     Args:
-        name_or_path: such as ``"linkages/four-bar"`` or ``"my/robot.toml"``.
+        name_or_path: such as ``"linkages/four-bar"`` or ``"my/robot.toml"``, or a folder with one URDF file.
         symbolic: keep the table's parameters as sympy symbols; for a ``.toml`` only.
 
     Returns:
@@ -37,7 +37,7 @@ def load_robot(name_or_path: str | Path, symbolic: bool = False) -> Robot:
         ('crank', 'crank_pin', 'rocker_pin', 'rocker')
     """
     expect(name_or_path, (str, Path), "name_or_path", "a bundled robot's name or the path of a file")
-    path = find_robot(name_or_path)
+    path = _file_in(find_robot(name_or_path))
     if path.suffix.lower() == ".csv":
         from screwkin.model.dh_csv import load_dh
         from screwkin.model.dh_robot import robot_from_dh
@@ -45,6 +45,16 @@ def load_robot(name_or_path: str | Path, symbolic: bool = False) -> Robot:
         _only_numbers(symbolic, str(path), "a DH table")
         return robot_from_dh(load_dh(path), path.stem, str(path))
     return _read(read_text(path, TableError), str(path), symbolic, path)
+
+
+def _file_in(path: Path) -> Path:
+    """The one URDF file of a folder, such as a package of ROS; of a file the file itself."""
+    if not path.is_dir():
+        return path
+    files = sorted(file for file in path.rglob("*") if file.suffix.lower() == ".urdf")
+    if len(files) != 1:
+        raise UnknownNameError("robot, for a folder", str(path), [str(file) for file in files])
+    return files[0]
 
 
 def robot_from_text(text: str, name: str = "<text>", symbolic: bool = False) -> Robot:

@@ -25,10 +25,12 @@ from screwkin.model.inertias import (
     inertia_from_matrix,
     inertia_matrix,
     nearest_body,
+    radius_of_gyration,
     without_noise,
 )
 from screwkin.model.records import Box, CoupledJoint, Frame, Inertia, Joint, Link, RobotRecord, Shape
 from screwkin.model.robot import Robot
+from screwkin.model.shapes import box_points, shape_points
 from screwkin.model.srdf import find_srdf, read_srdf, with_srdf
 from screwkin.model.structure import RESERVED
 from screwkin.model.toml import read_text
@@ -173,10 +175,28 @@ def _beside(reader: Reader, robot: RobotRecord, srdf: Path) -> RobotRecord:
 def _audit_bodies(
     reader: Reader, bodies: Sequence[_Body], parts: Sequence[Link], base: str, names: Mapping[str, str]
 ) -> None:
-    """Moving without mass is a remark."""
+    """Moving without mass, and inertia that does not fit into the link or the robot, are remarks."""
+    places = np.array([as_array(body.frame.p) for body in bodies])
+    span = float(np.linalg.norm(np.ptp(places, axis=0)))
     for body, part in zip(bodies, parts, strict=True):
+        reach, what = _extent(part), "the link's extent"
+        if reach == 0:
+            reach, what = span, "the distances between the robot's joints"
+        gyration = radius_of_gyration(part.inertia, part.mass)
+        if gyration > max(reach, 1e-3):
+            reader.note(
+                f"radius of gyration beyond {what}", f"{part.name} ({gyration:.3g} m > {reach:.3g} m)"
+            )
         if not part.mass and base not in body.poses:
             reader.note("moves without mass, which simulators need (Robot.with_inertia_floor)", part.name)
+
+
+def _extent(link: Link) -> float:
+    """Diagonal [m] of the box around a link's boxes and solids; 0 without any, or with a mesh beside them."""
+    if any(shape.kind == "mesh" for shape in link.shapes) or not (link.boxes or link.shapes):
+        return 0.0
+    points = [*map(box_points, link.boxes), *map(shape_points, link.shapes), as_array(link.com)[None]]
+    return float(np.linalg.norm(np.ptp(np.concatenate(points), axis=0)))
 
 
 def _frames(bodies: Iterable[_Body], names: Mapping[str, str]) -> tuple[Frame, ...]:
