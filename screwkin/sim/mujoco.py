@@ -1,4 +1,4 @@
-"""The robot in MuJoCo: rigid bodies, motors and contacts. The only file that imports mujoco.
+"""The robot in MuJoCo: rigid bodies, motors and contacts.
 
 The model is built from the table: bodies are links in the table's frames (see ``sim.bodies``), the geometry
 in contact is that of the table's boxes and soles, loops are closed by welds. A motor is dry friction against

@@ -1,9 +1,12 @@
 """``convert``: any of the three formats into any other, with a word on what is lost."""
 
+import warnings
+
 import numpy as np
 import pytest
 
 from screwkin.algebra.se3 import IDENTITY, as_array
+from screwkin.cli.output import remarks_of_robots, shortened
 from screwkin.errors import RobotRemark
 from screwkin.kinematics.positions import link_displacements
 from screwkin.model.dh_csv import load_dh
@@ -118,3 +121,15 @@ def test_couplings_survive_table_and_urdf_and_are_told_where_they_are_lost(cli, 
         "f2": {"joint": "f1", "ratio": -1.0, "offset": 0.0}
     }
     assert "-f1" in cli("table", "./grip.toml").out
+
+
+def test_remarks_stand_once_and_their_lists_of_names_are_cut(capsys):
+    text = "remark: merged: " + ", ".join(f"link_{i}" for i in range(200))
+    with remarks_of_robots():
+        for _ in range(2):
+            warnings.warn(text.removeprefix("remark: "), RobotRemark, stacklevel=1)
+    (line,) = capsys.readouterr().err.splitlines()
+    head, more = line.rsplit(" and ", 1)
+    assert line == shortened(text)
+    assert head.count("link_") + int(more.removesuffix(" more")) == 200
+    assert shortened("remark: short, one") == "remark: short, one"
