@@ -86,8 +86,9 @@ class Driven:
 def driven(robot: Robot, at_rest: tuple[str, ...] = ()) -> Driven:
     """What a gait drives of a robot with a ``home`` posture.
 
-    Legs follow poses with up to six joints of their own. Arms follow poses with six joints, positions with
-    three; with fewer than three they rest. A robot with closures is driven as a whole.
+    Legs follow poses with up to six joints of their own. Arms of six joints follow poses, of any other number
+    positions with the three that move the hand best; with fewer than three they rest. A robot with closures
+    is driven as a whole.
 
     Args:
         robot: with a ``home`` posture.
@@ -142,7 +143,7 @@ def _chosen(robot: Robot, limb: Limb, home: Array) -> tuple[int, ...]:
     if limb.kind == "leg":
         count = min(POSE, len(own))
     else:
-        count = next((n for n in (POSE, POSITION) if n <= len(own)), 0)
+        count = POSE if len(own) == POSE else POSITION if len(own) >= POSITION else 0
     return tuple(own) if count == len(own) else _best(robot, limb, own, count, home)
 
 
