@@ -1,7 +1,7 @@
-"""A gait that fits a robot: how large, fast and bent its steps may be, by its own limits, speeds and torques.
+"""A gait that fits a robot: how large, quick and bent its steps may be by limits, speeds and torques.
 
-The search goes from large, quick steps on bent legs to small, slow ones on straight legs. Many gaits are tried
-coarsely in one batch; the first promising ones are planned in full and judged by the model alone.
+The search goes from large, quick steps on bent legs to small, slow ones on straight legs. Many gaits are
+tried coarsely in one batch; the first promising ones are planned in full and judged by the model alone.
 """
 
 from __future__ import annotations
