@@ -1,4 +1,4 @@
-"""What is doubtful in a robot: masses, inertias, limits, axes, symmetry, soles, loops, what simulators change.
+"""What is doubtful in a robot: masses, inertias, limits, axes, symmetry, soles, loops, what simulators do.
 
 Nothing is mended here: every remark says where, what and what to do about it.
 """
