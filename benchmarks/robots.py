@@ -29,7 +29,7 @@ from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.choice import closed_mechanism
 
 STEPS = 6
-POSES = 60
+POSES = 20
 """Random poses of a leg within its limits, made by its own forward kinematics."""
 ENGINES: tuple[Engine, ...] = ("mujoco", "pybullet")
 Row = dict[str, Any]
@@ -107,7 +107,7 @@ def page_of(rows: Sequence[Row]) -> str:
         "# Public robots, unedited",
         "",
         "Written by `python -m benchmarks.robots FOLDER... --page docs/robots.md`: every URDF as its authors",
-        f"publish it; limbs, soles and home found, a gait fitted, {STEPS} steps, `validate` with its defaults",
+        f"publish it; limbs, soles and home found, a gait fitted, {STEPS} steps, `validate` with defaults",
         "on rigid servos. Anatomy: processor time of limbs, soles and home.",
         "Solved: the share of a leg's own random poses within limits that inverse kinematics finds again.",
         "",
