@@ -40,6 +40,7 @@ def test_the_gait_is_given_in_lengths_of_the_robot_and_its_file_holds_the_same(r
     np.testing.assert_array_equal(first.q, second.q)
 
 
+@pytest.mark.slow
 def test_slower_joints_get_a_slower_gait(robot, gait):
     slow = robot.replace(velocity={joint.name: 2.2 for joint in robot.joints if "left" not in joint.name})
     fitted = fitting_gait(slow)
@@ -47,6 +48,7 @@ def test_slower_joints_get_a_slower_gait(robot, gait):
     assert np.abs(sk.walk(slow, fitted, 3).qd).max() <= 2.2
 
 
+@pytest.mark.slow
 def test_a_robot_too_weak_for_any_gait_is_told_which_joint_and_by_how_much(robot):
     weak = robot.replace(effort={joint.name: 0.02 for joint in robot.joints if "left" not in joint.name})
     with pytest.raises(NoSolutionError, match=r"no gait fits; with .*knee needs [\d.]+ of 0\.02 N m"):
