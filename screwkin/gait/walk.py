@@ -64,7 +64,7 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
 
 
 def planned_walk(robot: Robot, gait: Gait, steps: int, command: str = "") -> Trajectory:
-    """The whole-body trajectory of a gait that is fitted to the robot; ``walk`` without a search for remedies.
+    """The whole-body trajectory of a gait that is fitted to the robot: ``walk`` without remedies.
 
     Args:
         robot: with two legs, soles and a ``home`` posture.
