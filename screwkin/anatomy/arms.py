@@ -19,7 +19,7 @@ def arms_of(skeleton: Skeleton, symmetry: Symmetry, stance: Stance) -> tuple[Pai
 
 def _reach(skeleton: Skeleton, root: int) -> float:
     """Greatest distance of what a branch carries from its root's axis point [m]."""
-    start = skeleton.place((skeleton.robot.joints[root].child,))
+    start = skeleton.place((skeleton.robot.tree[root].child,))
     return max(float(np.linalg.norm(skeleton.place((name,)) - start)) for name in skeleton.links_beyond(root))
 
 
@@ -27,13 +27,13 @@ def chains_of(skeleton: Skeleton, symmetry: Symmetry, pair: Pair) -> tuple[tuple
     """Joints of both arms: down to where one is no single chain any more, or has no partner.
 
     A branch that carries no further joint (a gear, one finger of a gripper) is no continuation; where
-    several carry some, the hand begins.
+    several carry some, or a joint follows another one, the hand begins.
     """
-    first = [pair.one]
+    first, own = [pair.one], len(skeleton.robot.joints)
     while True:
         further = skeleton.next(first[-1])
         longer = [k for k in further if depth(skeleton, k) > 1] if len(further) > 1 else list(further)
-        if len(longer) != 1 or not symmetry.pairs[longer[0]]:
+        if len(longer) != 1 or not symmetry.pairs[longer[0]] or longer[0] >= own:
             break
         first.append(longer[0])
     second = tuple(int(symmetry.partner[i]) for i in first)

@@ -47,7 +47,7 @@ def of_forward(forward: Forward) -> Finding:
 
 def of_leg(robot: Robot, side: str, foot: Foot, stance: Stance) -> Finding:
     """A leg, by how well the robot stands on it in its zero pose."""
-    names = [robot.joint_names[i] for i in foot.joints]
+    names = [robot.tree[i].name for i in foot.joints]
     sure = (1 - 0.4 * stance.splay / SPLAYED) * (1 - 0.3 * stance.lean / TOPPLED)
     why = (
         f"of the mirrored limbs this pair reaches lowest; it points {stance.splay:.0f} deg off the vertical,"
@@ -62,8 +62,8 @@ def of_leg(robot: Robot, side: str, foot: Foot, stance: Stance) -> Finding:
 
 def of_arm(robot: Robot, side: str, joints: Sequence[int]) -> Finding:
     """An arm: the other mirrored limb that reaches furthest."""
-    names = [robot.joint_names[i] for i in joints]
-    end = robot.joints[joints[-1]].child
+    names = [robot.tree[i].name for i in joints]
+    end = robot.tree[joints[-1]].child
     why = "of the mirrored limbs that do not stand, this pair reaches furthest; it ends where its chain does"
     return Finding(f"{side}_arm", f"{len(names)} joints, {_listed(names)}, to {end}", 0.9, why)
 
@@ -87,10 +87,10 @@ def of_sole(side: str, foot: Foot, at: Footing, kinds: str) -> Finding:
 
 def of_waist(robot: Robot, legs: Sequence[Foot], arms: Sequence[Sequence[int]]) -> Finding:
     """The frame that gaits steer, and the joints between legs and arms."""
-    pelvis = robot.joints[legs[0].joints[0]].parent
+    pelvis = robot.tree[legs[0].joints[0]].parent
     shared = set(robot.path_to(pelvis))
-    chest = robot.joints[arms[0][0]].parent if arms and arms[0] else pelvis
-    between = [robot.joint_names[i] for i in sorted(set(robot.path_to(chest)) ^ shared)]
+    chest = robot.tree[arms[0][0]].parent if arms and arms[0] else pelvis
+    between = [robot.tree[i].name for i in sorted(set(robot.path_to(chest)) ^ shared)]
     answer = "midway between the hips, level"
     why = f"the legs hang on {pelvis}" + (", the base link" if pelvis == robot.base_link else "")
     why += (
@@ -119,7 +119,7 @@ def of_home(home: Home, size: float) -> Finding:
 def of_rest(robot: Robot, rest: Sequence[Pair], outline_remarks: Sequence[str]) -> tuple[str, ...]:
     """Mirrored limbs that are neither legs nor arms, and meshes that could not be read."""
     others = [
-        f"the limbs from {robot.joint_names[p.one]} and {robot.joint_names[p.other]} are neither legs nor"
+        f"the limbs from {robot.tree[p.one].name} and {robot.tree[p.other].name} are neither legs nor"
         " arms: they rest at their posture"
         for p in rest
     ]

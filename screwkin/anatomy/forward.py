@@ -82,7 +82,7 @@ def _knee(skeleton: Skeleton, foot: Foot, normal: Array) -> float:
     across = [i for i in foot.joints if abs(skeleton.s[i] @ normal) > 1 - 10 * TILT and skeleton.turns[i]]
     if len(across) < 2:
         return 0.0
-    middle = skeleton.robot.joints[across[len(across) // 2]]
+    middle = skeleton.robot.tree[across[len(across) // 2]]
     lower, upper = (float(np.clip(x, -np.pi, np.pi)) for x in (middle.lower, middle.upper))
     sense = np.sign(float(skeleton.s[skeleton.robot.joint_above[middle.child]] @ normal))
     return float(sense * (upper + lower) / (upper - lower)) if upper > lower else 0.0

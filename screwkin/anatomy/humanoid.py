@@ -70,7 +70,7 @@ def anatomy(robot: Robot) -> Anatomy:
     symmetry = symmetry_of(skeleton)
     if symmetry is None:
         raise AnatomyError(
-            f"{robot.name}: none of its {len(robot.joints)} joints is the mirror image of another one, so"
+            f"{robot.name}: none of its {len(robot.tree)} joints is the mirror image of another one, so"
             " that it has no left and right; a walk needs two mirrored legs"
         )
     stance = stance_of(skeleton, symmetry, outline)
@@ -144,7 +144,7 @@ def _leg(robot: Robot, side: str, foot: Foot, at: Footing) -> Limb:
 
 def _arm(robot: Robot, side: str, chain: tuple[int, ...]) -> Limb:
     """An arm's tip is the CoM of its hand, with axes as the base's."""
-    link = robot.joints[chain[-1]].child
+    link = robot.tree[chain[-1]].child
     skeleton = Skeleton.of(robot)
     place = vector_from_array(skeleton.place(skeleton.links_beyond(chain[-1])))
     return Limb(
@@ -218,5 +218,5 @@ def _legs(
         hip=float((R @ root_of(skeleton, left[0]))[2]),
         ankle=footing[0].ankle,
         points=footing[0].kind == "point",
-        shared=len(robot.path_to(robot.joints[left[0]].parent)),
+        shared=len(robot.path_to(robot.tree[left[0]].parent)),
     )

@@ -87,7 +87,7 @@ def pairs_of(skeleton: Skeleton, symmetry: Symmetry) -> tuple[Pair, ...]:
     """All pairs of mirrored branches with at least ``LEAST`` joints in a row, from the topmost ones on."""
     found = []
     paired = symmetry.pairs
-    for i, joint in enumerate(skeleton.robot.joints):
+    for i, joint in enumerate(skeleton.robot.tree):
         above = skeleton.robot.path_to(joint.parent)
         if not paired[i] or any(paired[k] for k in above):
             continue
@@ -215,7 +215,7 @@ def _upward(skeleton: Skeleton, symmetry: Symmetry) -> Array:
 
 def _refuse_other_floors(skeleton: Skeleton, surface: Surface, stance: Stance) -> None:
     """Refuse a body that stands on more than two limbs, on something else, or not at all."""
-    robot, names = skeleton.robot, skeleton.robot.joint_names
+    robot, names = skeleton.robot, [joint.name for joint in skeleton.robot.tree]
     floor = stance.low + REACH * stance.length
     if robot.base == "fixed":
         raise AnatomyError(f"{robot.name} is fixed to the world by {robot.base_link}: it stands on no legs")

@@ -23,7 +23,7 @@ class Skeleton:
     """The lines of n joints, and which joint hangs below which.
 
     Attributes:
-        robot: with all joints at 0.
+        robot: with all joints at 0; joints are counted as in ``Robot.tree``, coupled ones among them.
         s: (n, 3) unit vectors of the axes, base axes.
         s0: (n, 3) a point of each axis [m].
         turns: (n,) bool, False for a prismatic joint, which has a direction but no line.
@@ -43,7 +43,7 @@ class Skeleton:
         """
         if robot.is_symbolic:
             raise InputError(f"{robot.name} holds symbols; anatomy is read from numbers")
-        screws = [joint.screw for joint in robot.joints]
+        screws = [joint.screw for joint in robot.tree]
         s, s0 = (
             np.array([as_array(v) for v in column], dtype=float).reshape(-1, 3)
             for column in ([screw.s for screw in screws], [screw.s0 for screw in screws])
@@ -54,13 +54,13 @@ class Skeleton:
     def children(self) -> dict[str, tuple[int, ...]]:
         """For every link: the joints that stand on it."""
         below: dict[str, list[int]] = {name: [] for name in self.robot.link_names}
-        for i, joint in enumerate(self.robot.joints):
+        for i, joint in enumerate(self.robot.tree):
             below[joint.parent].append(i)
         return {name: tuple(joints) for name, joints in below.items()}
 
     def next(self, joint: int) -> tuple[int, ...]:
         """The joints that stand on the link that a joint carries."""
-        return self.children[self.robot.joints[joint].child]
+        return self.children[self.robot.tree[joint].child]
 
     def carried(self, joint: int) -> Iterator[int]:
         """A joint, and all joints beyond it."""
@@ -70,7 +70,7 @@ class Skeleton:
 
     def links_beyond(self, joint: int) -> tuple[str, ...]:
         """Names of the links that a joint moves."""
-        return tuple(self.robot.joints[i].child for i in self.carried(joint))
+        return tuple(self.robot.tree[i].child for i in self.carried(joint))
 
     def place(self, links: tuple[str, ...]) -> Array:
         """Common CoM of links (3,) [m]; of massless ones the middle of their frames."""

@@ -78,7 +78,7 @@ def feet_of(skeleton: Skeleton, symmetry: Symmetry, stance: Stance, outline: Out
     if (
         last >= 0
         and last != second.joints[-1]
-        and stance.legs.other in skeleton.robot.path_to(skeleton.robot.joints[last].child)
+        and stance.legs.other in skeleton.robot.path_to(skeleton.robot.tree[last].child)
     ):
         second = _standing(skeleton, stance, outline, stance.legs.other, last)
     return first, second
@@ -90,14 +90,14 @@ def _foot(skeleton: Skeleton, stance: Stance, outline: Outline, root: int) -> Fo
     with_points = [name for name in links if len(outline.of([name]))]
     if not with_points:
         raise AnatomyError(
-            f"{skeleton.robot.name}: no link of the leg from {skeleton.robot.joint_names[root]} has a shape"
+            f"{skeleton.robot.name}: no link of the leg from {skeleton.robot.tree[root].name} has a shape"
             " that can be read, so that no sole can be seen; give its meshes, or write [[limb]] and [[sole]]"
         )
     lowest = min(with_points, key=lambda name: float((outline.of([name]) @ stance.up).min()))
     last = skeleton.robot.joint_above[lowest]
     foot = _standing(skeleton, stance, outline, root, last)
     while last != root:
-        last = skeleton.robot.path_to(skeleton.robot.joints[last].parent)[-1]
+        last = skeleton.robot.path_to(skeleton.robot.tree[last].parent)[-1]
         higher = _standing(skeleton, stance, outline, root, last)
         own = outline.of([higher.link])
         near = own[own @ higher.facet.up <= higher.facet.height + band_of(stance)] @ across(higher.facet.up)
@@ -114,7 +114,7 @@ def band_of(stance: Stance) -> float:
 
 def _standing(skeleton: Skeleton, stance: Stance, outline: Outline, root: int, last: int) -> Foot:
     """The foot if it begins with the link that a joint carries."""
-    path = skeleton.robot.path_to(skeleton.robot.joints[last].child)
+    path = skeleton.robot.path_to(skeleton.robot.tree[last].child)
     joints = path[path.index(root) :]
     link, *toes = skeleton.links_beyond(last)
     facet = facet_below(outline.of([link, *toes]), stance.up, band_of(stance))

@@ -55,7 +55,7 @@ def _data(found: Anatomy, path: Path) -> dict[str, Any]:
             "kind": limb.kind,
             "link": limb.link,
             "tip": limb.tip,
-            "joints": [robot.joint_names[i] for i in robot.path_to(limb.link)],
+            "joints": [robot.tree[i].name for i in robot.path_to(limb.link)],
             "frame": as_array(limb.frame).tolist(),
         }
         for limb in robot.limbs
