@@ -102,6 +102,11 @@ def driven(robot: Robot, at_rest: tuple[str, ...] = ()) -> Driven:
     return Driven(robot, moving or robot, joints, home, resting, at_rest, turned)
 
 
+def arms_of(robot: Robot) -> tuple[str, ...]:
+    """Names of the limbs that are no legs."""
+    return tuple(limb.name for limb in robot.limbs if limb.kind != "leg")
+
+
 Parts = tuple[Robot | None, tuple[int, ...], Array, tuple[str, ...], Mapping[str, Array]]
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from screwkin.errors import LimitError, SingularError, UnreachableError
 from screwkin.gait.arms import unable_arms
-from screwkin.gait.driven import Driven, driven
+from screwkin.gait.driven import Driven, arms_of, driven
 from screwkin.gait.lengths import lengths_of
 from screwkin.gait.plan import Plan, plan
 from screwkin.gait.preview_plan import preview_plan
@@ -62,6 +62,8 @@ def follow(robot: Robot, gait: Gait, steps: int, at_rest: tuple[str, ...] = ()) 
         GaitError, InputError, NoSolutionError: as ``plan`` and ``preview_plan``.
     """
     whole, notes = stance_of(robot), tuple[str, ...]()
+    if gait.arms == "rest":
+        at_rest = arms_of(robot)
     while True:
         drive = driven(robot, at_rest)
         mechanism, stance = closed_mechanism(drive.moving), drive.stance(whole)

@@ -17,7 +17,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, norm
 from screwkin.compiler.program import kept
-from screwkin.gait.driven import driven
+from screwkin.gait.driven import arms_of, driven
 from screwkin.gait.realise import free_rotations
 from screwkin.gait.record import Gait, gait_from_dict
 from screwkin.gait.stance import stance_of
@@ -93,8 +93,7 @@ def stretched(robot: Robot, of: str = "waist") -> float:
         robot: with legs, soles and a ``home`` posture.
         of: name of a leg's tip: of this leg alone; ``"waist"``: of all.
     """
-    arms = tuple(limb.name for limb in robot.limbs if limb.kind != "leg")
-    drive, waist = driven(robot, arms), waist_frame(robot)
+    drive, waist = driven(robot, arms_of(robot)), waist_frame(robot)
     free = free_rotations(closed_mechanism(drive.moving))
     moving, q = drive.moving, np.array(drive.moving.posture("home").q)
     D = link_displacements(moving, q.tolist())

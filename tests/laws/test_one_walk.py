@@ -18,7 +18,7 @@ from screwkin.model.library import gait_names
 ROBOTS = {"poppy12-preview": "poppy12"}
 FEW = [("walk", 10), ("walk", 80), ("preview", 25), ("poppy12-preview", 20)]
 """Gaits and rates [1/s]: fewer samples than a program takes one by one, and more."""
-ALL = [(gait, rate) for gait in gait_names() for rate in (5, 20, 37, 50, 100, 200)]
+ALL = [(gait, rate) for gait in gait_names() if gait != "auto" for rate in (5, 20, 37, 50, 100, 200)]
 
 CHILD = """
 import json, sys
