@@ -13,12 +13,13 @@ import json
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import fields, replace
+from os.path import isfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import screwkin as sk
@@ -89,7 +90,7 @@ def played(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Played]:
 
     def loaded(source: str | Path) -> sk.Robot:
         path = Path(source)
-        return once((str(source), path.read_bytes() if path.is_file() else None), sk.load_robot, source)
+        return once((str(source), path.read_bytes() if isfile(path) else None), sk.load_robot, source)
 
     def recorded(trajectory: Trajectory) -> sk.Robot:
         return once(("recorded", str(trajectory.meta["robot"])), recorded_robot, trajectory)
@@ -211,7 +212,7 @@ def test_nothing_in_ten_thousand_changes_passes(played: Played, what: str) -> No
 
 
 def explored(played: Played, what: str, runs: int) -> None:
-    @settings(max_examples=runs, deadline=None, database=None)
+    @settings(max_examples=runs, deadline=None, database=None, suppress_health_check=[HealthCheck.too_slow])
     @given(draw=st.data())
     def explore(draw: st.DataObject) -> None:
         CHECKS[what](played, draw)
