@@ -31,7 +31,6 @@ def humanoid(
     extra: str = "",
     hip_y: float = 0.08,
     sole: tuple[float, float] = (0.2, 0.11),
-    tip_frame: str = "",
     ahead: float = 0.0,
 ) -> str:
     """A table.
@@ -43,7 +42,6 @@ def humanoid(
         extra: further rows.
         hip_y: half the width of the hips [m].
         sole: length and width [m].
-        tip_frame: orientation of a foot's frame, a key of its own.
         ahead: of the tip before the ankle [m].
     """
     chest = "chest" if waist else "pelvis"
@@ -54,11 +52,12 @@ def humanoid(
     if waist:
         rows += [_link("chest", 4.0, (0, 0, 0.22), (0.12, 0.2, 0.2))]
         rows += [_joint(f"waist_{waist}", "pelvis", "chest", waist, (0, 0, 0.1))]
-    rows += _limb("leg", leg, "pelvis", -hip_y, (ahead, -hip_y, SOLE), tip_frame)
+    plate = f"{{ center = [{ahead}, {-hip_y}, {SOLE + 0.01}], size = [{sole[0]}, {sole[1]}, 0.02] }}"
+    rows += _limb("leg", leg, "pelvis", -hip_y, (ahead, -hip_y, SOLE), plate)
     corners = [[x * sole[0] / 2 + ahead, y * sole[1] / 2 - hip_y, SOLE] for x, y in CORNERS]
     rows.append(f'[[sole]]\nlimb = "right_leg"\ncorners = {corners}')
     if arm:
-        rows += _limb("arm", arm, chest, -0.16, (0, -0.16, HAND), "")
+        rows += _limb("arm", arm, chest, -0.16, (0, -0.16, HAND))
     q = {
         "hip_pitch": -BEND,
         "knee_pitch": 2 * BEND,
@@ -76,7 +75,7 @@ CORNERS = ((1, -1), (1, 1), (-1, 1), (-1, -1))
 
 
 def _limb(
-    kind: str, names: Sequence[str], root: str, y: float, tip: tuple[float, float, float], frame: str
+    kind: str, names: Sequence[str], root: str, y: float, tip: tuple[float, float, float], plate: str = ""
 ) -> list[str]:
     """Rows of a right limb and of its reflection."""
     rows, parent = [], root
@@ -91,11 +90,13 @@ def _limb(
         )
         rows.append(_joint(f"right_{name}", parent, child, axis, (0, y, z)))
         parent = child
+    if plate:
+        rows[-2] = rows[-2].rpartition("boxes = ")[0] + f"boxes = [{plate}]"
     xyz = ", ".join(map(str, tip))
     end = "foot" if kind == "leg" else "hand"
     rows.append(
         f'[[limb]]\nname = "right_{kind}"\nkind = "{kind}"\nlink = "{parent}"\ntip = "right_{end}"\n'
-        f"frame = {{ xyz = [{xyz}]{frame} }}"
+        f"frame = {{ xyz = [{xyz}] }}"
     )
     rows.append(f'[[limb]]\nname = "left_{kind}"\nmirror = "y"\nof = "right_{kind}"')
     return rows

@@ -1,10 +1,11 @@
-"""Set-up shared by all tests: one thread per process, no display, repeatable examples, double precision."""
+"""Set-up shared by all tests: one thread per process, no display, repeatable examples, robots read once."""
 
 from __future__ import annotations
 
 import os
 import tempfile
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy is loaded: pytest-xdist has the cores
@@ -15,10 +16,24 @@ os.environ.setdefault("SCREWKIN_CACHE", str(Path(tempfile.gettempdir()) / f"scre
 import pytest
 from hypothesis import HealthCheck, settings
 
-settings.register_profile("dev", deadline=None, print_blob=True)
+from screwkin.model import table
+
+table.parse_robot = cache(table.parse_robot)
+"""One robot a text in every process: its programs are recorded once, not anew in every test that loads it."""
+
+FEW = 40
+"""Random examples of a law, where its test does not say how many; HYPOTHESIS_PROFILE=many draws 2,000."""
+
+settings.register_profile("dev", deadline=None, print_blob=True, max_examples=FEW)
 settings.register_profile(
-    "ci", deadline=None, print_blob=True, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+    "ci",
+    deadline=None,
+    print_blob=True,
+    max_examples=FEW,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.too_slow],
 )
+settings.register_profile("many", deadline=None, print_blob=True, max_examples=2000)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci" if os.environ.get("CI") else "dev"))
 
 

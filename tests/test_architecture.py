@@ -27,7 +27,7 @@ FLOORS: dict[str, int] = {
     "kinematics": 3, "motors": 3,
     "dynamics": 4, "mechanism": 4,
     "ik": 5, "compliance": 5,
-    "gait": 6, "trajectory": 6,
+    "gait": 6, "trajectory": 6, "anatomy": 6,
     "sim": 7, "servo": 7,
     "analysis": 8,
     "report": 9, "papers": 9, "export": 9,

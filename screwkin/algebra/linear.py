@@ -1,12 +1,15 @@
-"""Small linear systems as formulas on any scalar: Cramer's rule and orthogonal columns."""
+"""Small linear systems as formulas on any scalar: Cramer's rule, orthogonal columns, reflections."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from screwkin.algebra import scalar
-from screwkin.algebra.scalar import Scalar, minus, plus, times
+from screwkin.algebra.scalar import Scalar, abs_, larger, minus, plus, times, where
 from screwkin.algebra.se3 import Vector, cross, dot
+
+TINY = 1e-40
+"""What stands for a pivot that vanishes: far below rounding, and no inverse square of it overflows."""
 
 
 def cramer(columns: Sequence[Vector], wanted: Vector) -> tuple[list[Scalar], Scalar]:
@@ -43,6 +46,56 @@ def orthogonal(columns: Sequence[Sequence[Scalar]], wanted: Sequence[Scalar]) ->
         known = product(others, solution)
         solution.insert(0, minus(right[k], known) / size)
     return solution, volume
+
+
+def triangular(rows: Sequence[Sequence[Scalar]]) -> list[list[Scalar]]:
+    """The triangle R (row k from column k on) of a square matrix, by Householder's reflections.
+
+    All but the last column are reflected, which needs no pivots; structural zeros below the diagonal fold.
+    """
+    columns = [list(column) for column in zip(*rows, strict=True)]
+    triangle = []
+    for _ in columns[1:]:
+        head, *others = columns
+        size = scalar.sqrt(product(head, head))
+        corner = where(head[0] < 0, size, -size)
+        mirror = [minus(head[0], corner), *head[1:]]
+        square = size * (size + abs_(head[0]))
+        factor = where(square > 0, 1.0, 0.0) / where(square > 0, square, 1.0)
+        columns, row = [], [corner]
+        for column in others:
+            share = times(product(mirror, column), factor)
+            first, *rest = _less(column, mirror, share)
+            row.append(first)
+            columns.append(rest)
+        triangle.append(row)
+    return [*triangle, columns[0]]
+
+
+def determinant(rows: Sequence[Sequence[Scalar]]) -> Scalar:
+    """Determinant of a square matrix; every reflection of ``triangular`` changes its sign."""
+    value: Scalar = 1
+    for row in triangular(rows):
+        value = times(value, row[0])
+    return value if len(rows) % 2 else -value
+
+
+def null_vector(rows: Sequence[Sequence[Scalar]]) -> list[Scalar]:
+    """A vector, of any length, that a singular square matrix takes to zero: one inverse iteration."""
+    triangle = triangular(rows)
+    diagonal = [where(abs_(row[0]) > TINY, row[0], TINY) for row in triangle]
+    forward: list[Scalar] = []
+    for k, pivot in enumerate(diagonal):
+        known = product([triangle[i][k - i] for i in range(k)], forward)
+        forward.append(minus(1.0, known) / pivot)
+    vector: list[Scalar] = []
+    for k in reversed(range(len(rows))):
+        vector.insert(0, minus(forward[k], product(triangle[k][1:], vector)) / diagonal[k])
+    largest = vector[0] * vector[0]
+    for x in vector[1:]:
+        largest = larger(x * x, largest)
+    size = 1 / scalar.sqrt(largest)
+    return [x * size for x in vector]
 
 
 def product(a: Sequence[Scalar], b: Sequence[Scalar]) -> Scalar:

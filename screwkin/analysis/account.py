@@ -14,6 +14,7 @@ from screwkin.errors import TableError, TrajectoryError
 from screwkin.files import text_sha256
 from screwkin.gait.balance import Balance, zmp
 from screwkin.gait.intended import intended
+from screwkin.kinematics.limits import limited_joints
 from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.kinematics.status import SINGULAR
 from screwkin.mechanism.choice import closed_mechanism
@@ -90,7 +91,7 @@ class Account:
         fastest = np.abs(self.trajectory.qd).max(axis=0)
         return {
             joint.name: float(speed / joint.velocity)
-            for joint, speed in zip(self.robot.joints, fastest, strict=True)
+            for joint, speed in zip(limited_joints(self.robot), fastest, strict=True)
         }
 
     @property
@@ -98,7 +99,7 @@ class Account:
         """What works on paper, but not on the servos or not for long."""
         fast = [
             f"{joint.name} {share * joint.velocity:.1f} of {joint.velocity:.1f} rad/s"
-            for joint in self.robot.joints
+            for joint in limited_joints(self.robot)
             if (share := self.speed_use[joint.name]) > 1.0
         ]
         # In the words of a simulation's own warning, so that a page says it once.

@@ -13,6 +13,7 @@ from screwkin.mechanism.choice import closed_mechanism, mobility_at
 from screwkin.mechanism.mechanism import Mechanism
 from screwkin.mechanism.network import coupling_twists, network_of_twists
 from screwkin.mechanism.singularity import LimbSingularity, singularity_report
+from screwkin.model.coupled import coupling_of
 from screwkin.model.robot import Robot
 from screwkin.model.state import reference_posture
 
@@ -49,6 +50,7 @@ class Facts:
             "bodies": len(self.robot.links),
             "joints": len(self.robot.joints),
             "actuated_joints": len(self.actuated_joints),
+            "coupled_joints": {joint.name: coupling_of(joint) for joint in self.robot.coupled},
             "couplings": len(mechanism.couplings),
             "links": len(mechanism.links),
             "circuits": len(mechanism.circuit_matrix),

@@ -21,6 +21,7 @@ from screwkin.analysis.validate import planned_facts
 from screwkin.analysis.verdict import Criteria, Verdict, bound_to, contradictions, verdict_from_json
 from screwkin.errors import InputError, SafetyError, ScrewkinError, TrajectoryError, UnknownNameError
 from screwkin.files import read_file, text_sha256
+from screwkin.kinematics.limits import limited_joints
 from screwkin.model.records import LIMIT_TOLERANCE
 from screwkin.model.robot import Robot, robot_text
 from screwkin.model.table import load_robot
@@ -148,7 +149,7 @@ def limit_faults(robot: Robot, trajectory: Trajectory) -> list[str]:
     time, q = trajectory.time, trajectory.q
     steps = np.abs(np.diff(q, axis=0)) / np.diff(time)[:, None]
     faults = []
-    for k, joint in enumerate(robot.joints):
+    for k, joint in enumerate(limited_joints(robot)):
         below, above = joint.lower - LIMIT_TOLERANCE, joint.upper + LIMIT_TOLERANCE
         outside = (q[:, k] < below) | (q[:, k] > above)
         if outside.any():

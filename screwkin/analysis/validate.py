@@ -19,6 +19,7 @@ from screwkin.files import text_sha256
 from screwkin.gait.balance import zmp as balance_of
 from screwkin.gait.compensation import stiffness_of, way_of
 from screwkin.gait.intended import intended
+from screwkin.kinematics.limits import limited_joints
 from screwkin.model.robot import Robot, robot_text
 from screwkin.sim.camera import Camera, Picture
 from screwkin.sim.measure import Slip, ZmpRecord, slip, speed_use, torque_use, zmp_record
@@ -281,7 +282,7 @@ def _warnings(robot: Robot, trajectory: Trajectory, run: Run, slipped: Slip, spe
         warnings.append("commands that allow for elastic servos, simulated on rigid ones")
     fast = [
         f"{joint.name} {use * joint.velocity:.1f} of {joint.velocity:.1f} rad/s"
-        for joint, use in zip(robot.joints, speed, strict=True)
+        for joint, use in zip(limited_joints(robot), speed, strict=True)
         if use > 1.0
     ]
     if fast:

@@ -21,6 +21,7 @@ VERBS = {
     "gaits": "List the bundled gaits.",
     "info": "Mass, closed mechanism and conditioning of a robot.",
     "table": "The screw table of a robot; also Markdown, LaTeX and symbolic.",
+    "new": "The table of a humanoid from its URDF: limbs, soles and home, from geometry alone.",
     "convert": "Convert a robot between screw tables, URDF and DH tables.",
     "compare": "The screw model of a robot against its Denavit-Hartenberg model.",
     "ik": "Inverse kinematics methods compared on a limb: iterations, coverage, time.",

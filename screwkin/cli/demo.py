@@ -119,7 +119,7 @@ def _show_robot(show: Show, robot: Robot) -> None:
     show(f"1. The robot: {robot.description}, {float(robot.mass):.3f} kg")
     show("   is a table of screws, one per joint: an axis s through a point s0 in the zero pose. One limb:")
     limb = robot.limbs[0] if robot.limbs else None
-    joints = [robot.joints[i] for i in robot.path_to(limb.link)] if limb else list(robot.joints[:6])
+    joints = [robot.tree[i] for i in robot.path_to(limb.link)] if limb else list(robot.tree[:6])
     rows = [(j.name, _triple(j.screw.s, "g"), _triple(j.screw.s0, ".4f")) for j in joints]
     show(aligned([("joint", "s", "s0 [m]"), *rows], "     ") + "\n")
 

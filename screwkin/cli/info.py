@@ -11,6 +11,7 @@ from screwkin.cli.options import AsJson, RobotName, point_of
 from screwkin.cli.output import aligned, print_json
 from screwkin.compiler.run import large_batches
 from screwkin.errors import MissingDependencyError
+from screwkin.model.coupled import coupling_text
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
 from screwkin.sim.self_collision import touching_at_home
@@ -60,6 +61,8 @@ def _text(facts: Facts) -> str:
             for limb in robot.limbs
         ),
     ]
+    if robot.coupled:
+        body.append(("coupled joints", ", ".join(map(coupling_text, robot.coupled))))
     touching = _touching(robot)
     if touching is None:
         body.append(("links that touch at home", "unknown: needs mujoco (python -m pip install mujoco)"))

@@ -11,6 +11,7 @@ from screwkin.cli.options import AsJson, RobotName
 from screwkin.cli.output import print_json
 from screwkin.errors import InputError
 from screwkin.mechanism.printing import Style, print_symbolic, screw_rows, screw_table
+from screwkin.model.coupled import coupling_of
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
 
@@ -48,6 +49,7 @@ def _data(robot: Robot, derived: str | None) -> dict[str, Any]:
             "s": [_number(c) for c in row.s],
             "s0": [_number(c) for c in row.s0],
             "pitch": _number(row.pitch),
+            **({} if row.follows is None else {"mimic": coupling_of(row.follows)}),
         }
         for row in screw_rows(robot)
     ]

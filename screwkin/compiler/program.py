@@ -120,7 +120,7 @@ class Recorder:
     def __init__(self, name: str = "", about: str = "") -> None:
         self.graph = Graph()
         self.title(name, about)
-        self._inputs: list[Group] = []
+        self.inputs: list[Group] = []
         self._outputs: list[Group] = []
         self._places: list[int] = []
         self._results: list[Any] = []
@@ -135,13 +135,13 @@ class Recorder:
         Raises:
             InputError: there is an input of that name.
         """
-        if any(group.name == name for group in self._inputs):
+        if any(group.name == name for group in self.inputs):
             raise InputError(
                 f"{self.name} would have two inputs {name!r}; names of tips must differ in their letters and "
                 "digits"
             )
         group = Group(name, shape)
-        self._inputs.append(group)
+        self.inputs.append(group)
         nodes = [self.graph.input(f"{name}[{k}]") for k in range(group.size)]
         self._places += [node.index for node in nodes]
         return nodes
@@ -153,7 +153,7 @@ class Recorder:
             InputError: the known one has another shape.
         """
         at = 0
-        for group in self._inputs:
+        for group in self.inputs:
             if group.name == name:
                 if group.shape != shape:
                     raise InputError(f"{name} is wanted with shape {shape} and with {group.shape}")
@@ -170,10 +170,12 @@ class Recorder:
         self._outputs.append(group)
         self._results += flat
 
-    def program(self) -> Program:
-        """What has been recorded, without what no output needs."""
-        steps, results = _linear(self.graph, self._places, self._results)
-        return Program(self.name, self.about, tuple(self._inputs), tuple(self._outputs), steps, results)
+    def program(self, outputs: int | None = None) -> Program:
+        """What has been recorded, without what no output needs; of the first so many outputs, or of all."""
+        groups = self._outputs[:outputs]
+        wanted = self._results[: sum(group.size for group in groups)]
+        steps, results = _linear(self.graph, self._places, wanted)
+        return Program(self.name, self.about, tuple(self.inputs), tuple(groups), steps, results)
 
 
 def _linear(

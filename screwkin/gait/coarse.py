@@ -1,7 +1,7 @@
-"""Walks planned coarsely, many at once: which of several gaits a robot's limbs can reach.
+"""Walks planned coarsely, many at once: which of several gaits a robot's legs can follow.
 
-A coarse walk has few samples and few steps. In a preview gait the CoM keeps its place of the home posture in
-the waist. What is promising here is to be planned in full before it is believed.
+A coarse walk has few samples and few steps, and arms rest in it. In a preview gait the CoM keeps its place of
+the home posture in the waist. What is promising here is to be planned in full before it is believed.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from screwkin.errors import ScrewkinError
 from screwkin.gait.driven import Driven, driven
 from screwkin.gait.plan import Plan, plan
 from screwkin.gait.preview_plan import preview_plan
-from screwkin.gait.reach import on_other_branch
+from screwkin.gait.reach import on_other_branch, refuse_turns
 from screwkin.gait.realise import free_rotations, targets_of
 from screwkin.gait.record import Gait
 from screwkin.gait.stance import Stance, stance_of
@@ -56,7 +56,8 @@ def coarse_walks(robot: Robot, gaits: Sequence[Gait], steps: int = STEPS) -> lis
         gaits: fitted to it.
         steps: at most ``STEPS`` are planned.
     """
-    whole, drive = stance_of(robot), driven(robot)
+    arms = tuple(limb.name for limb in robot.limbs if limb.kind != "leg")
+    whole, drive = stance_of(robot), driven(robot, arms)
     mechanism, stance = closed_mechanism(drive.moving), drive.stance(whole)
     offset = _com_at_home(robot)
     plans = [_plan(mechanism, stance, offset, gait, min(steps, STEPS)) for gait in gaits]
@@ -73,7 +74,7 @@ def _solved(drive: Driven, mechanism: Mechanism, plans: Sequence[Plan]) -> list[
     targets = {name: np.concatenate([one[name] for one in every]) for name in every[0]}
     start = State(targets["base"], np.array(robot.posture("home").q))
     free = free_rotations(mechanism)
-    solution = solve_pose(robot, targets, start, settings=_ONE_START, free=free)
+    solution = solve_pose(robot, targets, start, free=free, settings=_ONE_START)
     good = (solution.status == Status.CONVERGED).all(axis=-1)
     for limb in robot.limbs:
         good &= ~on_other_branch(robot, targets, solution, limb, free)
@@ -87,11 +88,13 @@ def _plan(mechanism: Mechanism, stance: Stance, offset: Array, gait: Gait, steps
     try:
         few = gait.replace(rate=min(gait.rate, SAMPLES / gait.Tc))
         if gait.kind == "geometric":
-            return plan(few, stance, steps)
-        planned = preview_plan(mechanism, few.replace(com="waist"), stance, steps)
+            planned = plan(few, stance, steps)
+        else:
+            planned = preview_plan(mechanism, few.replace(com="waist"), stance, steps)
+        refuse_turns(mechanism.robot, planned, free_rotations(mechanism))
     except ScrewkinError:
         return None
-    if gait.com == "waist":
+    if gait.kind == "geometric" or gait.com == "waist":
         return planned
     T = planned.T_world_base.copy()
     shift = planned.T_world_base[:, :3, :3] @ offset

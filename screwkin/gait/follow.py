@@ -12,9 +12,7 @@ from screwkin.gait.preview_plan import preview_plan
 from screwkin.gait.realise import differentiate, positions
 from screwkin.gait.record import Gait
 from screwkin.gait.stance import stance_of
-from screwkin.ik.numeric import IkSettings
 from screwkin.ik.pose_solution import PoseSolution
-from screwkin.ik.whole_body import PRECISE
 from screwkin.mechanism.choice import closed_mechanism
 from screwkin.mechanism.joint_motion import JointMotion
 from screwkin.mechanism.mechanism import Mechanism
@@ -49,29 +47,29 @@ class Followed:
         return dict(zip(names, self.motion.sigma.min(axis=0).tolist(), strict=True))
 
 
-def follow(robot: Robot, gait: Gait, steps: int, settings: IkSettings = PRECISE) -> Followed:
+def follow(robot: Robot, gait: Gait, steps: int, at_rest: tuple[str, ...] = ()) -> Followed:
     """Plan a gait and solve for the joints; an arm that cannot follow its hand rests at home.
 
     Args:
         robot: with two legs, soles and a ``home`` posture.
         gait: fitted to the robot.
         steps: number of steps, at least 1.
-        settings: of the inverse kinematics.
+        at_rest: names of arms that rest in any case.
 
     Raises:
         UnreachableError, SingularError, LimitError: a leg cannot follow; names limb, sample and time.
         GaitError, InputError, NoSolutionError: as ``plan`` and ``preview_plan``.
     """
-    whole, at_rest, notes = stance_of(robot), tuple[str, ...](), tuple[str, ...]()
+    whole, notes = stance_of(robot), tuple[str, ...]()
     while True:
         drive = driven(robot, at_rest)
         mechanism, stance = closed_mechanism(drive.moving), drive.stance(whole)
         try:
             if gait.kind == "preview":
-                planned = preview_plan(mechanism, gait, stance, steps, settings)
+                planned = preview_plan(mechanism, gait, stance, steps)
             else:
                 planned = plan(gait, stance, steps)
-            solution = positions(mechanism, planned, settings=settings)
+            solution = positions(mechanism, planned)
             motion = differentiate(mechanism, planned, solution.state)
         except (UnreachableError, SingularError, LimitError) as error:
             if error.limb not in [limb.name for limb in robot.limbs if limb.kind != "leg"]:

@@ -18,6 +18,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, norm
 from screwkin.compiler.program import kept
 from screwkin.gait.driven import driven
+from screwkin.gait.realise import free_rotations
 from screwkin.gait.record import Gait, gait_from_dict
 from screwkin.gait.stance import stance_of
 from screwkin.ik.numeric import IkSettings
@@ -25,6 +26,7 @@ from screwkin.ik.pose import solve_pose
 from screwkin.kinematics.landmarks import limb_root, waist_frame
 from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.kinematics.status import Status
+from screwkin.mechanism.choice import closed_mechanism
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 
@@ -91,13 +93,15 @@ def stretched(robot: Robot, of: str = "waist") -> float:
         robot: with legs, soles and a ``home`` posture.
         of: name of a leg's tip: of this leg alone; ``"waist"``: of all.
     """
-    drive, waist = driven(robot), waist_frame(robot)
-    D = link_displacements(robot, list(robot.posture("home").q))
-    tips = [limb.tip for limb in drive.moving.limbs if limb.kind == "leg" and of in ("waist", limb.tip)]
-    at_home = {tip: as_array(pose_in_base(robot, D, tip)) for tip in tips}
+    arms = tuple(limb.name for limb in robot.limbs if limb.kind != "leg")
+    drive, waist = driven(robot, arms), waist_frame(robot)
+    free = free_rotations(closed_mechanism(drive.moving))
+    moving, q = drive.moving, np.array(drive.moving.posture("home").q)
+    D = link_displacements(moving, q.tolist())
+    tips = [limb.tip for limb in moving.limbs if of in ("waist", limb.tip)]
+    at_home = {tip: as_array(pose_in_base(moving, D, tip)) for tip in tips}
     up = as_array(waist.R.z).astype(float)
-    home = float(np.mean([-(waist.inverse @ pose_in_base(robot, D, tip).p).z for tip in tips]))
-    q = np.array(drive.moving.posture("home").q)
+    home = float(np.mean([-(waist.inverse @ pose_in_base(moving, D, tip).p).z for tip in tips]))
 
     def reached(heights: Array) -> Array:
         """Whether every leg reaches its foot (k,)."""
@@ -106,7 +110,7 @@ def stretched(robot: Robot, of: str = "waist") -> float:
             lowered = np.tile(T, (len(heights), 1, 1))
             lowered[:, :3, 3] -= (heights - home)[:, None] * up
             targets[tip] = lowered
-        solution = solve_pose(drive.moving, targets, State(np.eye(4), q), settings=_ONE_START)
+        solution = solve_pose(moving, targets, State(np.eye(4), q), free=free, settings=_ONE_START)
         return np.asarray((solution.status == Status.CONVERGED).all(axis=-1))
 
     low, high = home, _TALLEST * home

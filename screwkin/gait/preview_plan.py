@@ -26,8 +26,6 @@ from screwkin.gait.preview import CartMotion, follow_reference, preview_gains
 from screwkin.gait.realise import differentiate, positions
 from screwkin.gait.record import Gait
 from screwkin.gait.stance import Stance
-from screwkin.ik.numeric import IkSettings
-from screwkin.ik.whole_body import PRECISE
 from screwkin.kinematics.mass import mass_center
 from screwkin.kinematics.positions import link_displacements
 from screwkin.mechanism.mechanism import Mechanism
@@ -41,9 +39,7 @@ TRACKED = 1e-9
 """How closely the CoM follows its reference [m]."""
 
 
-def preview_plan(
-    mechanism: Mechanism, gait: Gait, stance: Stance, steps: int, ik: IkSettings = PRECISE
-) -> Plan:
+def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -> Plan:
     """The plan of a gait of kind ``preview``.
 
     Args:
@@ -51,7 +47,6 @@ def preview_plan(
         gait: ``dsp`` (fraction of Tc), ``horizon`` [s], ``Qe``, ``Qx``, ``R`` are its own parameters.
         stance: feet, soles and shoulders of the robot.
         steps: number of swings, at least 1.
-        ik: settings of the inverse kinematics.
 
     Returns:
         Plan of (steps + 2) Tc rate samples.
@@ -78,7 +73,7 @@ def preview_plan(
     if gait.com == "true":
         rest = np.zeros((1, 2))
         standing = around(CartMotion(reference[:1], rest, rest, reference[:1]), slice(1))
-        stand, q = _followed(mechanism, standing, reference[:1], ik)
+        stand, q = _followed(mechanism, standing, reference[:1])
         height = _com(mechanism.robot, stand, q)[0, 2]
     gains = preview_gains(
         1 / gait.rate, height, settings["horizon"], settings["Qe"], settings["Qx"], settings["R"]
@@ -87,7 +82,7 @@ def preview_plan(
     planned = around(cart)
     if gait.com == "waist":
         return replace(planned, notes=("the waist is taken for the CoM",))
-    return _tracked(mechanism, planned, cart, ik)
+    return _tracked(mechanism, planned, cart)
 
 
 def zmp_reference(gait: Gait, stance: Stance, holds: tuple[Foothold, ...], steps: int, time: Array) -> Array:
@@ -185,23 +180,23 @@ def _com(robot: Robot, planned: Plan, q: Array) -> Array:
     return np.asarray(as_array(pose_from_array(planned.T_world_base) @ mass_center(robot, D), (len(q),)))
 
 
-def _followed(mechanism: Mechanism, planned: Plan, wanted: Array, ik: IkSettings) -> tuple[Plan, Array]:
+def _followed(mechanism: Mechanism, planned: Plan, wanted: Array) -> tuple[Plan, Array]:
     """The plan with its waist moved until the CoM stands over ``wanted`` (T, 2), and its joint positions."""
-    q = positions(mechanism, planned, settings=ik).state.q
+    q = positions(mechanism, planned).state.q
     share = _share(mechanism, planned, q)
     for _ in range(20):
         error = wanted - _com(mechanism.robot, planned, q)[:, :2]
         if np.abs(error).max() < TRACKED:
             return planned, q
         planned = _moved(planned, _solved(share, error))
-        q = positions(mechanism, planned, q, ik).state.q
+        q = positions(mechanism, planned, q).state.q
     far = 1e3 * np.abs(error).max()
     raise NoSolutionError(f"the waist cannot bring the CoM to its reference; {far:.2g} mm are missing")
 
 
-def _tracked(mechanism: Mechanism, planned: Plan, cart: CartMotion, ik: IkSettings) -> Plan:
+def _tracked(mechanism: Mechanism, planned: Plan, cart: CartMotion) -> Plan:
     """The plan whose CoM of all links follows the cart, in all three derivatives."""
-    planned, q = _followed(mechanism, planned, cart.com, ik)
+    planned, q = _followed(mechanism, planned, cart.com)
     share, none = _share(mechanism, planned, q), np.zeros_like(cart.com)
     velocity, _ = _com_rates(mechanism, planned, q)
     planned = _driven(planned, _solved(share, cart.velocity - velocity), none)

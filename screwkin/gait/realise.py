@@ -13,10 +13,8 @@ from screwkin.algebra.se3 import (
 )
 from screwkin.gait.plan import Plan
 from screwkin.gait.reach import refuse_turns, refuse_unreachable
-from screwkin.ik.numeric import IkSettings
 from screwkin.ik.pose import solve_pose
 from screwkin.ik.pose_solution import PoseSolution
-from screwkin.ik.whole_body import PRECISE
 from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.mechanism.choice import RANK_TOLERANCE
 from screwkin.mechanism.joint_motion import JointMotion, joint_motion
@@ -25,16 +23,13 @@ from screwkin.mechanism.singularity import refuse_singular
 from screwkin.model.state import State
 
 
-def positions(
-    mechanism: Mechanism, planned: Plan, guess: Array | None = None, settings: IkSettings = PRECISE
-) -> PoseSolution:
+def positions(mechanism: Mechanism, planned: Plan, guess: Array | None = None) -> PoseSolution:
     """Joint positions that follow a plan.
 
     Args:
         mechanism: of a robot whose joints follow from base and tips.
         planned: T samples.
         guess: (T, n) or (n,) [rad or m]; default: the home posture.
-        settings: of the inverse kinematics.
 
     Returns:
         PoseSolution of all samples; every one converged.
@@ -47,7 +42,7 @@ def positions(
     targets = {"base": planned.T_world_base, **targets_of(mechanism, planned)}
     free = free_rotations(mechanism)
     refuse_turns(robot, planned, free)
-    solution = solve_pose(robot, targets, State(planned.T_world_base, start), settings=settings, free=free)
+    solution = solve_pose(robot, targets, State(planned.T_world_base, start), free=free)
     refuse_unreachable(robot, planned, targets, solution, free)
     return solution
 

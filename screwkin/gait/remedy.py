@@ -64,7 +64,7 @@ class _Trial:
     def works(self, changes: Mapping[str, float]) -> bool:
         """Whether the robot follows the gait with some numbers changed."""
         try:
-            follow(self.robot, self.gait.replace(**changes), self.steps)
+            follow(self.robot, self.gait.replace(**changes), self.steps, _arms(self.robot))
         except ScrewkinError:
             return False
         return True
@@ -141,8 +141,12 @@ def _together(trial: _Trial, moves: Mapping[str, float]) -> Iterator[str]:
         yield f"{now} do not fit together: {listed} work"
 
 
+def _arms(robot: Robot) -> tuple[str, ...]:
+    return tuple(limb.name for limb in robot.limbs if limb.kind != "leg")
+
+
 def _unknown(gait: Gait) -> str:
     """What to look at where no change was found that works."""
-    keys = ("waist_height", "hand_drop", "stride", "side", "turn", "lift", "sway", "spread")
+    keys = ("waist_height", "stride", "side", "turn", "lift", "sway", "spread")
     listed = ", ".join(f"{key} {getattr(gait, key):g}" for key in keys)
     return f"No change of one key works; the gait has {listed}"

@@ -194,7 +194,7 @@ def _solved_block(
 ) -> tuple[Array, Array, Array]:
     """The solutions of a few samples, see ``solve_closed``."""
     q, error = _refined(form.chain, form.branches(target), target)
-    valid = _first_of_its_kind(q, error) & (error <= EXACT)
+    valid = first_of_its_kind(q, error)
     lost = np.flatnonzero(~valid.any(axis=1))
     if len(lost):
         best = likeliest(form.chain, q[lost], error[lost], guess[lost])
@@ -251,11 +251,19 @@ def _refined(chain: SerialChain, q: Array, target: Array, steps: int = 2) -> tup
     return chain.wrapped(flat).reshape(count, k, n), error.reshape(count, k)
 
 
-def _first_of_its_kind(q: Array, error: Array) -> Array:
-    """(B, k) bool, False for a branch that repeats a more exact one."""
-    same = np.ones((*error.shape, error.shape[1]), dtype=bool)
+def first_of_its_kind(q: Array, error: Array) -> Array:
+    """(B, k) bool, False for a branch that is no solution, or repeats a more exact one."""
+    valid = error <= EXACT
+    pair = np.triu(np.ones((error.shape[1], error.shape[1]), dtype=bool), 1)
+    sample, i, j = (_alike(q[:, :, None, 0], q[:, None, :, 0]) & pair).nonzero()
     for joint in range(q.shape[-1]):
-        apart = np.abs(q[:, :, None, joint] - q[:, None, :, joint])
-        same &= (apart < SAME) | (apart > 2 * np.pi - SAME)
-    rank = error.argsort(axis=1, kind="stable").argsort(axis=1)
-    return np.asarray(~(same & (rank[:, None, :] < rank[:, :, None])).any(axis=2))
+        both = _alike(q[sample, i, joint], q[sample, j, joint]) & valid[sample, i] & valid[sample, j]
+        sample, i, j = sample[both], i[both], j[both]
+    worse = np.where(error[sample, j] < error[sample, i], i, j)
+    valid[sample, worse] = False
+    return np.asarray(valid)
+
+
+def _alike(a: Array, b: Array) -> Array:
+    apart = np.abs(a - b)
+    return np.asarray((apart < SAME) | (apart > 2 * np.pi - SAME))

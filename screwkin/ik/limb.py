@@ -40,15 +40,16 @@ def limb_ik(
         limb: name of a limb, or of its tip.
         T_base_tip: wanted poses of the tip in the base frame (..., 4, 4) [m]; or positions (..., 3) with the
             orientation free.
-        method: ``"closed"``, exact and with all branches, for limbs whose screw table allows it; numeric from
-            the guess: ``"newton"``, ``"lm"`` (Levenberg-Marquardt), ``"dls"`` (damped least squares),
-            ``"pinv"`` (pseudoinverse); ``"hybrid"``: numeric from the solution of a similar limb with a
-            spherical hip; ``"auto"``: closed where possible, else newton.
+        method: ``"closed"``, exact and with all branches, for limbs whose screw table allows it;
+            ``"branches"``, all of them for six revolute joints of any geometry; numeric from the guess:
+            ``"newton"``, ``"lm"`` (Levenberg-Marquardt), ``"dls"`` (damped least squares), ``"pinv"``
+            (pseudoinverse); ``"hybrid"``: numeric from the solution of a similar limb with a spherical hip;
+            ``"auto"``: closed where possible, else branches, else newton.
         guess: positions (..., n) of the limb's joints [rad or m]; default: those of posture ``home``, without
             one the middle of the limits. Numeric methods start there, and branches near it come first.
         settings: tolerances, starts, damping and the like of the numeric methods. Within the tolerances a
             solution inside the limits is preferred to a more exact one outside.
-        least_squares: spend time on the nearest reachable pose where the closed form has no solution.
+        least_squares: spend time on the nearest reachable pose where no branch is a solution.
         free: rotations of the tip that need not be met, out of ``rx ry rz``, in the order in which they turn
             it about its own axes: what a limb of fewer than six joints has to leave open. NumPy arrays only.
 

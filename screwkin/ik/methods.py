@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.errors import InputError
+from screwkin.ik.all_branches import branch_solutions, has_branches
 from screwkin.ik.branches import closed_solutions
 from screwkin.ik.closed import closed_form, recognised
 from screwkin.ik.hybrid import hybrid_seed
@@ -17,7 +19,10 @@ from screwkin.ik.system import System
 from screwkin.kinematics.arrays import checked, exact_target, of_shape, one_batch
 from screwkin.kinematics.serial_chain import SerialChain
 
-Method = Literal["auto", "closed", "hybrid", "newton", "lm", "dls", "pinv"]
+STARTS = 8
+"""Starts for the nearest pose where no branch is a solution: hardly any is missed."""
+Chosen = Literal["closed", "branches", "hybrid"] | Numeric
+Method = Literal["auto", "closed", "branches", "hybrid", "newton", "lm", "dls", "pinv"]
 
 
 def solve_limb_arrays(
@@ -42,14 +47,21 @@ def solve_limb_arrays(
     return solve_limb(chain, flat, method, flat_guess, settings, batch, least_squares)
 
 
-def _chosen(chain: SerialChain, method: Method, position: bool) -> Literal["closed", "hybrid"] | Numeric:
-    """The method; of ``"auto"`` the closed form where there is one, else newton.
+def _chosen(chain: SerialChain, method: Method, position: bool) -> Chosen:
+    """The method; of ``"auto"`` the closed form where there is one, else all branches, else newton.
 
     Raises:
-        InputError: the limb has no closed form, but the method is ``"closed"``.
+        InputError: the limb has no closed form, but the method is ``"closed"``; or no branches.
     """
     if method == "auto":
-        return "closed" if recognised(chain, position) else "newton"
+        if recognised(chain, position):
+            return "closed"
+        return "branches" if not position and has_branches(chain) else "newton"
+    if method == "branches" and (position or not has_branches(chain)):
+        raise InputError(
+            f"{chain.limb} has no branches that can be computed: poses (..., 4, 4) and six revolute"
+            " joints in general places are needed. Use a numeric method"
+        )
     if method == "closed" and not recognised(chain, position):
         if position:
             raise InputError(
@@ -86,6 +98,8 @@ def solve_limb(
     chosen = _chosen(chain, method, position)
     if chosen == "closed":
         return closed_solutions(chain, target, guess, settings.tolerances, nearest)
+    if chosen == "branches":
+        return _by_branches(chain, target, guess, settings, batch, nearest)
     if chosen == "hybrid" and position:
         raise InputError("method hybrid needs poses (..., 4, 4); positions (..., 3) need another method")
     start = hybrid_seed(chain, target, guess) if chosen == "hybrid" else guess
@@ -96,3 +110,23 @@ def solve_limb(
     one = (slice(None), None)
     error, valid = np.linalg.norm(lack, axis=1), arrived(system, lack, settings)
     return ordered(chain, chosen, q[one], valid[one], error[one], iterations[one], guess, batch)
+
+
+def _by_branches(
+    chain: SerialChain,
+    target: Array,
+    guess: Array,
+    settings: IkSettings,
+    batch: tuple[int, ...],
+    nearest: bool,
+) -> LimbSolutions:
+    """All branches; where there is none, if wanted, what Newton's method comes nearest to the target with."""
+    solutions = branch_solutions(chain, target, guess, settings.tolerances, batch)
+    lost = np.flatnonzero(~solutions.valid.reshape(len(target), -1).any(axis=1))
+    if nearest and len(lost):
+        few = replace(settings, starts=min(settings.starts, STARTS))
+        part = solve_limb(chain, target[lost], "newton", guess[lost], few, (len(lost),))
+        for name in ("q", "valid", "in_limits", "residual", "iterations"):
+            whole = getattr(solutions, name)
+            whole.reshape(len(target), *whole.shape[len(batch) :])[lost, 0] = getattr(part, name)[:, 0]
+    return solutions

@@ -9,6 +9,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.pytrees import pytree
 from screwkin.errors import LimitError, SingularError, UnreachableError
+from screwkin.kinematics.limits import limited_joints
 from screwkin.kinematics.status import Status
 from screwkin.model.robot import Joint, Robot
 from screwkin.model.state import State
@@ -69,7 +70,7 @@ class PoseSolution:
             raise SingularError(f"{where}: singular; {status.help}{more}", name, sample)
         worst = int(flat["worst_joint"][sample, limb])
         q = float(np.reshape(self.state.q, (-1, len(robot.joints)))[sample, worst])
-        message = f"{where}: {_beyond(robot.joints[worst], q)}; {status.help}{more}"
+        message = f"{where}: {_beyond(limited_joints(robot)[worst], q)}; {status.help}{more}"
         raise LimitError(message, name, sample)
 
 

@@ -15,6 +15,7 @@ from screwkin.algebra.scalar import Scalar, abs_, larger, least, where
 from screwkin.algebra.se3 import NO_TWIST, ZERO, Pose, Vector
 from screwkin.compiler.program import Program, Recorder
 from screwkin.compiler.records import identifier, pose_input
+from screwkin.ik.all_branches import branch_programs, has_branches
 from screwkin.ik.closed import EXACT, recognised
 from screwkin.kinematics.arrays import Argument
 from screwkin.kinematics.door import Door
@@ -277,12 +278,15 @@ def limb_determinant(chain: SerialChain, q: Sequence[Scalar]) -> Scalar:
 
 
 def limb_programs(chain: SerialChain) -> list[Program]:
-    """The programs of a limb's closed forms: what ``limb_ik`` and ``solve_pose`` run for it."""
+    """The programs of a limb's closed forms or branches: what ``limb_ik`` and ``solve_pose`` run."""
     kinds = [position for position in (False, True) if recognised(chain, position)]
-    return [make(chain, position).guarded for position in kinds for make in (limb_branches, limb_pose)]
+    closed = [make(chain, position).guarded for position in kinds for make in (limb_branches, limb_pose)]
+    if False in kinds or not has_branches(chain):
+        return closed
+    return [*closed, *branch_programs(chain)]
 
 
 def limb_programs_of(robot: Robot) -> list[Program]:
-    """The programs worth preparing for inverse kinematics: of every limb that has a closed form."""
+    """The programs worth preparing for inverse kinematics: of limbs whose branches are known."""
     limbs = [] if robot.closures else [SerialChain.of(robot, limb.name) for limb in robot.limbs]
     return [program for chain in limbs for program in limb_programs(chain)]

@@ -12,8 +12,10 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.pattern import components
 from screwkin.compiler.program import kept
+from screwkin.ik.all_branches import has_branches
 from screwkin.ik.branches import certified_pose, closed_pose
 from screwkin.ik.closed import recognised
+from screwkin.ik.methods import solve_limb
 from screwkin.ik.numeric import IkSettings, arrived, solve_system
 from screwkin.ik.pose_solution import PoseSolution
 from screwkin.ik.system import System
@@ -78,8 +80,12 @@ def solve_whole_body(
     }
     for rows in _apart(robot, tuple(flat)):
         chain, target = limbs[rows[0]][1:]
-        alone = len(rows) == 1 and method == "auto" and recognised(chain, target.ndim == 2)
-        solve = _by_closed_form if alone else _by_newton
+        solve = _by_newton
+        if len(rows) == 1 and method == "auto":
+            if recognised(chain, target.ndim == 2):
+                solve = _by_closed_form
+            elif target.ndim == 3 and has_branches(chain):
+                solve = _by_branches
         solve(_Work(base, q, parts, settings), [limbs[row] for row in rows], rows)
     counts = [parts[name].reshape(*batch, len(limbs)) for name in COUNTED]
     state = State(base.reshape(*batch, 4, 4), q[:, :size].reshape(*batch, size))
@@ -140,9 +146,20 @@ def _by_closed_form(work: _Work, limbs: Sequence[Limb], rows: Sequence[int]) -> 
         parts["worst_joint"][beyond, row] = np.array(joints)[worst]
 
 
+def _by_branches(work: _Work, limbs: Sequence[Limb], rows: Sequence[int]) -> None:
+    """One limb of six joints without closed form."""
+    ((tip, chain, target),) = limbs
+    base = exact_target("base", checked("base", work.base))
+    target = in_base(base, exact_target(tip, checked(tip, target)))
+    guess = work.q[:, list(chain.joints)]
+    solutions = solve_limb(chain, target, "branches", guess, work.settings, (len(target),))
+    x, system = chain.nearest_turn(solutions.best, guess), System([chain], [target])
+    _fill(work, system, x, solutions.iterations[:, 0], rows)
+
+
 def _by_newton(work: _Work, limbs: Sequence[Limb], rows: Sequence[int]) -> None:
     """Limbs that share joints, together."""
-    base, q, parts, settings = work.base, work.q, work.parts, work.settings
+    base, q, settings = work.base, work.q, work.settings
     base = exact_target("base", checked("base", base))
     targets = [in_base(base, exact_target(tip, checked(tip, target))) for tip, _, target in limbs]
     system = System([chain for _, chain, _ in limbs], targets)
@@ -150,14 +167,17 @@ def _by_newton(work: _Work, limbs: Sequence[Limb], rows: Sequence[int]) -> None:
     guess = q[:, joints]
     x, iterations = solve_system(system, "newton", guess, settings)
     x = limits.nearest_turn(x, guess, system.lower, system.upper, system.turning)
-    q[:, joints] = x
+    _fill(work, system, x, iterations, rows)
+
+
+def _fill(work: _Work, system: System, x: Array, iterations: Array, rows: Sequence[int]) -> None:
+    """Put solutions x (B, n) of limbs in their places, judged."""
+    work.q[:, list(system.joints)] = x
     _judge(work, system, x, rows, np.arange(len(x)))
-    for (_, chain, _), row in zip(limbs, rows, strict=True):
-        parts["iterations"][:, row] = iterations
-        own = q[:, list(chain.joints)]
-        parts["worst_joint"][:, row] = np.array(chain.joints)[
-            limits.worst_joint(own, chain.lower, chain.upper)
-        ]
+    for chain, row in zip(system.chains, rows, strict=True):
+        work.parts["iterations"][:, row] = iterations
+        worst = limits.worst_joint(work.q[:, list(chain.joints)], chain.lower, chain.upper)
+        work.parts["worst_joint"][:, row] = np.array(chain.joints)[worst]
 
 
 def _judge(work: _Work, system: System, x: Array, rows: Sequence[int], samples: Array) -> None:

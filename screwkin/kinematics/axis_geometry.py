@@ -13,7 +13,7 @@ ALIKE = 1e-9
 """Largest angle [rad] and, relative to the limb's size, distance at which axes are parallel or meet."""
 
 
-def meeting(chain: SerialChain, joints: Sequence[int]) -> Vector | None:
+def meeting(chain: SerialChain, joints: Sequence[int], tolerance: float = ALIKE) -> Vector | None:
     """The point where the axes of some joints meet, None if they do not or are parallel."""
     A, b = np.zeros((3, 3)), np.zeros(3)
     lines = [
@@ -23,16 +23,16 @@ def meeting(chain: SerialChain, joints: Sequence[int]) -> Vector | None:
     for s, s0 in lines:
         across = np.eye(3) - np.outer(s, s)
         A, b = A + across, b + across @ s0
-    if np.linalg.cond(A) > 1 / ALIKE:
+    if np.linalg.cond(A) > 1 / tolerance:
         return None
     p = np.linalg.solve(A, b)
     gaps = [float(np.linalg.norm(np.cross(s, p - s0))) for s, s0 in lines]
-    return Vector(*map(float, p)) if max(gaps) <= ALIKE * chain.length else None
+    return Vector(*map(float, p)) if max(gaps) <= tolerance * chain.length else None
 
 
-def parallel(chain: SerialChain, i: int, j: int) -> bool:
+def parallel(chain: SerialChain, i: int, j: int, tolerance: float = ALIKE) -> bool:
     """True if the axes of two joints have one direction (or opposite ones)."""
-    return _sine(chain, i, j) <= ALIKE
+    return _sine(chain, i, j) <= tolerance
 
 
 def angle(chain: SerialChain, i: int, j: int) -> float:

@@ -17,7 +17,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.scalar import Scalar, is_jax, where
 from screwkin.compiler.memory import results
-from screwkin.compiler.program import Group, Recorder
+from screwkin.compiler.program import Group, Program, Recorder
 from screwkin.compiler.run import compile_program, is_prepared, machine_code, python_function, run_rows
 from screwkin.kinematics.arrays import Argument, checked_inputs, input_rows
 from screwkin.kinematics.rigid import deviations
@@ -36,18 +36,24 @@ class Door:
         arguments: its inputs, with what messages call them.
 
     Attributes:
-        program: as recorded.
-        guarded: the same with the guard as one more output.
+        guarded: the program with the guard as one more output.
+        names: of the other outputs.
     """
 
     def __init__(self, recorder: Recorder, arguments: Sequence[Argument]) -> None:
-        self.program = recorder.program()
         by_name = {argument.name: argument for argument in arguments}
-        self.arguments = tuple(by_name[group.name] for group in self.program.inputs)
+        self.arguments = tuple(by_name[group.name] for group in recorder.inputs)
         recorder.output("guard", [_guard(recorder, self.arguments)])
         self.guarded = recorder.program()
-        self.names = [group.name for group in self.program.outputs]
-        self._inputs, self._outputs = _layouts(self.program.inputs), _layouts(self.program.outputs)
+        *outputs, _ = self.guarded.outputs
+        self.names = [group.name for group in outputs]
+        self._inputs, self._outputs = _layouts(self.guarded.inputs), _layouts(outputs)
+        self._recorder = recorder
+
+    @cached_property
+    def program(self) -> Program:
+        """The program as recorded, without the guard."""
+        return self._recorder.program(len(self.names))
 
     def prepare(self) -> Door:
         """Compile the program, if there is a compiler; later calls use machine code."""
@@ -134,7 +140,7 @@ class Door:
         inputs, _ = checked_inputs(self.arguments, arrays)
         named = {a.name: x for a, x in zip(self.arguments, inputs, strict=True)}
         found = xla_call.run(self.program, named)
-        return [found[group.name] for group in self.program.outputs]
+        return [found[name] for name in self.names]
 
 
 def _layouts(groups: Sequence[Group]) -> list[tuple[tuple[int, ...], Any]]:

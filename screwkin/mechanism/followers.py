@@ -35,7 +35,7 @@ def tip_chain(robot: Robot, limb: str) -> tuple[str, ...]:
     """Couplings of the virtual chain of a limb's tip, those that follow last.
 
     A chain that the table orders otherwise than x, y, z is the user's choice and stays. So does the chain of
-    a limb with any other number of joints than four or five.
+    a limb with any other number of joints than four or five, or with coupled ones.
 
     Args:
         robot: the robot.
@@ -43,8 +43,10 @@ def tip_chain(robot: Robot, limb: str) -> tuple[str, ...]:
     """
     chosen = robot.limb(limb)
     path = robot.path_to(chosen.link)
-    numbers = (chosen.frame, *(robot.joints[i].screw for i in path))
-    if chosen.chain != SPATIAL or len(path) not in ORDERS or any(True for _ in open_scalars(numbers)):
+    numbers = (chosen.frame, *(robot.tree[i].screw for i in path))
+    if chosen.chain != SPATIAL or len(path) not in ORDERS or max(path) >= len(robot.joints):
+        return chosen.chain
+    if any(True for _ in open_scalars(numbers)):
         return chosen.chain
     orders = ORDERS[len(path)]
     volumes = [_volume(robot, limb, order[len(path) - 3 :]) for order in orders]

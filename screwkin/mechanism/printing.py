@@ -10,6 +10,8 @@ from screwkin.algebra.scalar import Scalar, is_symbolic
 from screwkin.algebra.se3 import Vector, cross
 from screwkin.errors import InputError
 from screwkin.mechanism.symbolic import SymbolicLimb, symbolic_limb, symbolic_loops
+from screwkin.model.coupled import coupling_text
+from screwkin.model.records import CoupledJoint
 from screwkin.model.robot import Robot
 
 Style = Literal["text", "markdown", "latex"]
@@ -24,7 +26,8 @@ _MARK = "~"
 class ScrewRow:
     """One joint of a screw table: axis s, a point s0 of it [m], pitch [m/rad], moment s0 x s [m].
 
-    A prismatic joint has infinite pitch and no moment: where its axis runs does not matter.
+    A prismatic joint has infinite pitch and no moment: where its axis runs does not matter. A coupled joint
+    says what it ``follows``.
     """
 
     joint: str
@@ -33,6 +36,7 @@ class ScrewRow:
     s0: Vector
     pitch: Scalar
     moment: Vector | None
+    follows: CoupledJoint | None = None
 
 
 def screw_rows(robot: Robot) -> list[ScrewRow]:
@@ -41,7 +45,8 @@ def screw_rows(robot: Robot) -> list[ScrewRow]:
     for joint in robot.tree:
         s, s0, pitch = joint.screw.s, joint.screw.s0, joint.screw.pitch
         moment = None if joint.screw.is_translation else cross(s0, s)
-        rows.append(ScrewRow(joint.name, joint.type, s, s0, pitch, moment))
+        follows = joint if isinstance(joint, CoupledJoint) else None
+        rows.append(ScrewRow(joint.name, joint.type, s, s0, pitch, moment, follows))
     return rows
 
 
@@ -66,6 +71,11 @@ def screw_table(robot: Robot, style: Style = "text") -> str:
         pitch = write.infinite if row.moment is None else write.math(row.pitch)
         name = write.name(row.joint)
         cells.append([name, row.type, write.vector(row.s), write.vector(row.s0), pitch, moment])
+        if robot.coupled:
+            follows = "" if row.follows is None else coupling_text(row.follows).partition(" = ")[2]
+            cells[-1].append(write.name(follows))
+    if robot.coupled:
+        header.append("position")
     return _table(header, cells, style)
 
 

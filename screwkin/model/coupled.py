@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from typing import Any
 
 from screwkin.model.records import LIMIT_TOLERANCE, CoupledJoint, Joint
 
@@ -38,6 +39,11 @@ def composed(couplings: Mapping[str, Coupling], name: str) -> Coupling:
         leader, further, start = couplings[leader]
         ratio, offset = ratio * further, ratio * start + offset
     return leader, ratio, offset
+
+
+def coupling_of(joint: CoupledJoint) -> dict[str, Any]:
+    """A joint's coupling by the keys of a table."""
+    return {"joint": joint.leader, "ratio": joint.ratio, "offset": joint.offset}
 
 
 def tightened(joint: Joint, coupled: Iterable[CoupledJoint]) -> Joint:

@@ -184,7 +184,7 @@ def _suits(robot: RobotRecord, link: Link, shape: Shape, upright: bool) -> int:
     lines = [(as_array(link.com), np.zeros(3))] if link.mass else []
     lines += [
         (as_array(joint.screw.s0), as_array(joint.screw.s))
-        for joint in robot.joints
+        for joint in robot.tree
         if link.name in (joint.parent, joint.child) and joint.type == "revolute"
     ]
     R, p = T[:3, :3], T[:3, 3]

@@ -15,6 +15,7 @@ from typing import Any
 from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.se3 import IDENTITY, UNTURNED, ZERO, Pose, Rotation, Vector, leaves
 from screwkin.errors import InputError
+from screwkin.model.coupled import coupling_of
 from screwkin.model.mesh_files import short_path
 from screwkin.model.records import (
     CoupledJoint,
@@ -154,7 +155,7 @@ def _joint(joint: Joint) -> dict[str, Any]:
     limits = {key: getattr(joint, key) for key in _UNLIMITED}
     row |= {key: x for key, x in limits.items() if x != _UNLIMITED[key]}
     if isinstance(joint, CoupledJoint):
-        row["mimic"] = {"joint": joint.leader, "ratio": joint.ratio, "offset": joint.offset}
+        row["mimic"] = coupling_of(joint)
     return row
 
 

@@ -16,6 +16,8 @@ from screwkin.analysis.account import Account
 from screwkin.analysis.facts import Facts, facts_of
 from screwkin.analysis.validate import Validation
 from screwkin.files import atomic_write
+from screwkin.model.coupled import coupling_text
+from screwkin.model.records import CoupledJoint
 from screwkin.model.robot import Robot
 from screwkin.report.numbers import validation_numbers, walk_numbers
 from screwkin.report.pictures import Saved
@@ -177,13 +179,13 @@ def _screws(robot: Robot) -> str:
 
     rows = [
         (
-            joint.name,
+            coupling_text(joint) if isinstance(joint, CoupledJoint) else joint.name,
             joint.type,
             point(joint.screw.s),
             point(joint.screw.s0),
             limits(joint.lower, joint.upper, joint.type != "prismatic"),
         )
-        for joint in robot.joints
+        for joint in robot.tree
     ]
     return _table(rows, ("joint", "type", "s", "s0", "limits"), ("", "", "number", "number", "number"))
 

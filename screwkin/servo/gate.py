@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
 from screwkin.errors import SafetyError
+from screwkin.kinematics.limits import limited_joints
 from screwkin.model.robot import Robot
 from screwkin.servo.profiles import Profile, Register
 from screwkin.servo.servo_map import ServoMap
@@ -74,7 +75,8 @@ class Bounds:
         profiles = tuple(servo.profile for servo in mounted)
         scale = np.array([servo.direction * servo.profile.tick for servo in mounted])
         zero = np.array([servo.profile.centre + servo.zero / servo.profile.tick for servo in mounted])
-        limits = np.array([[joint.lower, joint.upper] for joint in robot.joints])
+        joints = limited_joints(robot)
+        limits = np.array([[joint.lower, joint.upper] for joint in joints])
         ends = np.sort(limits / scale[:, None] + zero[:, None], axis=1)
         last = np.array([profile.ticks - 1 for profile in profiles])
         lower, upper = np.maximum(ends[:, 0], 0), np.minimum(ends[:, 1], last)
@@ -83,7 +85,7 @@ class Bounds:
             raise SafetyError(
                 f"{robot.joint_names[k]}: its limits lie outside the range of servo {mounted[k].id}"
             )
-        pairs = list(zip(robot.joints, profiles, strict=True))
+        pairs = list(zip(joints, profiles, strict=True))
         rate = np.array([min(joint.velocity, profile.no_load_speed) for joint, profile in pairs])
         speed = rate / [profile.speed_unit for profile in profiles]
         if not (speed >= 1).all():

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.algebra.se3 import as_array, pose_from_array, unstack
 from screwkin.errors import InputError
-from screwkin.kinematics import positions
+from screwkin.kinematics.body import tip_poses
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 from screwkin.sim.backend import Command, Observation
@@ -26,7 +25,7 @@ class KinematicBackend:
         self.dt = dt
         self.settings: Mapping[str, Any] = {"dt": dt}
         self._robot = robot
-        self._legs = [limb.tip for limb in robot.limbs if limb.kind == "leg"]
+        self._legs = [k for k, limb in enumerate(robot.limbs) if limb.kind == "leg"]
         self._steps = 0
         self._pose: Array | None = None
         self._q = self._qd = np.zeros(len(robot.joints))
@@ -50,16 +49,16 @@ class KinematicBackend:
         """The present state."""
         if self._pose is None:
             raise InputError("the simulation has no state yet; call reset first")
-        base = pose_from_array(self._pose)
-        displacements = positions.link_displacements(self._robot, unstack(self._q))
-        feet = [base @ positions.pose_in_base(self._robot, displacements, tip) for tip in self._legs]
+        feet = np.zeros((0, 4, 4))
+        if self._legs:
+            feet = tip_poses(self._robot, State(self._pose, self._q))[self._legs]
         return Observation(
             time=self._steps * self.dt,
             T_world_base=self._pose.copy(),
             q=self._q.copy(),
             qd=self._qd.copy(),
             torque=np.zeros_like(self._q),
-            T_world_foot=as_array(feet) if feet else np.zeros((0, 4, 4)),
+            T_world_foot=feet,
             ankle_wrench=np.full((len(feet), 6), np.nan),
             contacts=(),
         )

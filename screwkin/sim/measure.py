@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
+from screwkin.kinematics.limits import limited_joints
 from screwkin.model.robot import Robot
 from screwkin.sim.run import Run
 from screwkin.trajectory import Trajectory
@@ -104,7 +105,7 @@ def torque_use(run: Run, robot: Robot, window: float = WINDOW) -> Array:
 def speed_use(trajectory: Trajectory, robot: Robot) -> Array:
     """Share (n,) of every servo's speed limit that the planned rates need."""
     return np.asarray(
-        np.abs(trajectory.qd).max(axis=0) / np.array([joint.velocity for joint in robot.joints])
+        np.abs(trajectory.qd).max(axis=0) / np.array([joint.velocity for joint in limited_joints(robot)])
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import jax
 import jax.numpy as jnp
@@ -132,10 +133,14 @@ def symmetric_products(matrices):
     return products + np.swapaxes(products, 2, 3)
 
 
+@cache
+def hessian_of_exp_at_zero():
+    return np.array(jax.hessian(lambda x: as_array(se3.exp(twist_from_array(x))))(jnp.zeros(6)))
+
+
 def test_second_derivative_of_exp_at_zero_is_that_of_its_series():
     """exp = 1 + X + X^2 / 2 + ...; libraries are known to be off by a factor of two here."""
-    hessian = jax.hessian(lambda x: as_array(se3.exp(twist_from_array(x))))(jnp.zeros(6))
-    np.testing.assert_allclose(hessian, symmetric_products(HATS) / 2, rtol=0, atol=2 * EPS)
+    np.testing.assert_allclose(hessian_of_exp_at_zero(), symmetric_products(HATS) / 2, rtol=0, atol=2 * EPS)
 
 
 def test_log_of_a_product_has_the_mixed_derivative_of_baker_campbell_hausdorff():
@@ -159,8 +164,7 @@ def test_second_derivative_of_exp_at_zero_is_what_sympy_finds():
     ray = [sympy.Rational(k, 7) * s for k in (3, -6, 2, 5, 1, -4)]  # |omega| = s
     symbolic = se3.exp(Twist(Vector(*ray[:3]), Vector(*ray[3:])))
     direction = np.array([float(r / s) for r in ray])
-    hessian = np.array(jax.hessian(lambda x: as_array(se3.exp(twist_from_array(x))))(jnp.zeros(6)))
-    along = np.einsum("abij,i,j->ab", hessian, direction, direction)
+    along = np.einsum("abij,i,j->ab", hessian_of_exp_at_zero(), direction, direction)
     expected = np.zeros((4, 4))
     for (i, j), entry in np.ndenumerate(as_array(symbolic)):
         expected[i, j] = float(sympy.series(sympy.sympify(entry), s, 0, 3).removeO().coeff(s, 2) * 2)
@@ -175,16 +179,18 @@ def all_in_one(x):
 
 
 def test_gradients_are_finite_at_zero_on_thresholds_and_at_a_half_turn():
-    """Not compiled as one: operation by operation this is much quicker than compiling second derivatives."""
+    """Not compiled as one: operation by operation this is much quicker than compiling second derivatives.
+
+    Forward over reverse: what is not finite in either makes the second derivative no number.
+    """
     angles = [0.0, 1e-160, 1e-8, 0.2499, 0.25, 0.5, 1.0, 2.0, 3.0, math.sqrt(10), math.pi]
     axes = np.vstack([np.eye(3), -np.eye(3), [[0.6, 0, 0.8]]])
     points = jnp.array([[*(axis * angle), 0.3, -1.0, 0.7] for axis in axes for angle in angles])
-    for derivative in (jax.jacrev(all_in_one), jax.jacfwd(jax.jacfwd(all_in_one))):
-        assert np.isfinite(jax.vmap(derivative)(points)).all()
+    assert np.isfinite(jax.vmap(jax.hessian(all_in_one))(points)).all()
 
 
 @given(screws.filter(lambda screw: not screw.is_translation))
-@settings(max_examples=20)
+@settings(max_examples=8)
 def test_the_derivative_of_a_displacement_at_home_is_the_screw_itself(screw):
     def moved(theta):
         return as_array(displacement(screw, theta))

@@ -27,8 +27,13 @@ def robot_of(text: str) -> Robot:
 
 
 @cache
-def walked(text: str, gait: str) -> sk.Trajectory:
-    return sk.walk(robot_of(text), sk.load_gait(gait).replace(rate=10), 2)
+def walked(text: str, gait: str, rate: float = 10) -> sk.Trajectory:
+    return sk.walk(robot_of(text), sk.load_gait(gait).replace(rate=rate), 2)
+
+
+@cache
+def seen_from_the_chest() -> Robot:
+    return seen_from(robot_of(BIOLOID), Pose(UNTURNED, Vector(0.02, 0.0, 0.12)))
 
 
 @pytest.mark.parametrize("gait", GAITS)
@@ -39,8 +44,7 @@ def test_other_points_of_the_axes_walk_the_same(case: str, gait: str) -> None:
 
 @pytest.mark.parametrize("gait", GAITS)
 def test_a_base_frame_at_the_chest_walks_the_same(gait: str) -> None:
-    robot = seen_from(robot_of(BIOLOID), Pose(UNTURNED, Vector(0.02, 0.0, 0.12)))
-    moved = sk.walk(robot, sk.load_gait(gait).replace(rate=10), 2)
+    moved = sk.walk(seen_from_the_chest(), sk.load_gait(gait).replace(rate=10), 2)
     assert_same_walk(moved, walked(BIOLOID, gait))
     height = moved.T_world_base[:, 2, 3] - walked(BIOLOID, gait).T_world_base[:, 2, 3]
     np.testing.assert_allclose(height, 0.12, atol=1e-12)
@@ -64,20 +68,20 @@ def test_a_joint_below_both_arms_rests(gait: str) -> None:
 
 def test_legs_without_yaw_walk_straight_and_sideways_and_name_what_they_lack_in_a_turn() -> None:
     for gait in ("walk", "sideways"):
-        assert walked(WITHOUT_YAW, gait).margin.min() > 0
+        assert walked(WITHOUT_YAW, gait, rate=4).margin.min() > 0
     lacks = (
         r"no joint of right_leg \(right_hip_roll, .*\) turns right_foot about the vertical.* "
         r"turn 0\.174533 is too far: 0 works"
     )
     with pytest.raises(UnreachableError, match=lacks):
-        walked(WITHOUT_YAW, "turn")
+        walked(WITHOUT_YAW, "turn", rate=4)
 
 
 def test_a_gait_that_stoops_too_low_names_the_key_to_change() -> None:
     key = r"right_knee at .*\. .*waist_height 0\.15 (.*: .*waist_height 0\.\d+ work|is too low: )"
     with pytest.raises(LimitError, match=key):
-        walked(LONG_LEGS, "walk")
-    higher = sk.load_gait("walk").replace(rate=10, waist_height=0.23)
+        walked(LONG_LEGS, "walk", rate=4)
+    higher = sk.load_gait("walk").replace(rate=4, waist_height=0.23)
     assert sk.walk(robot_of(LONG_LEGS), higher, 2).samples > 2
 
 

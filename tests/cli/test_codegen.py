@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+from typing import Any
 
 import pytest
 
@@ -12,19 +13,31 @@ WARNINGS = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-O1")
 needs_compiler = pytest.mark.skipif(native.compiler() is None, reason="no C compiler")
 
 
+SETS = [
+    ("bioloid", "ik,rates,tips,margin", "double"),
+    ("bioloid", "ik,rates,tips,margin", "float"),
+    ("poppy12", "ik,motion,com,zmp", "double"),
+    ("poppy12", "ik,motion,com,zmp", "float"),
+    ("poppy12", "deflection", "float"),
+    ("poppy12", "links,jacobian,mass_matrix,inverse_dynamics", "double"),
+]
+FLAGS = ("-DSCREWKIN_PACKS", "-march=native", "-DSCREWKIN_SCALAR")
+"""Packs of any processor (the macro means nothing), of this one, and single samples."""
+
+
+def each_set_and_each_flag() -> list[Any]:
+    """All pairs; the slow ones hold what pairs with the same set, and others with the same flag, hold."""
+    quick = {(k, k % len(FLAGS)) for k in range(len(SETS))}
+    return [
+        pytest.param(*SETS[k], flag, marks=() if (k, n) in quick else pytest.mark.slow)
+        for k in range(len(SETS))
+        for n, flag in enumerate(FLAGS)
+    ]
+
+
 @needs_compiler
-@pytest.mark.parametrize(
-    ("robot", "what", "kind"),
-    [
-        ("bioloid", "ik,rates,tips,margin", "double"),
-        ("bioloid", "ik,rates,tips,margin", "float"),
-        ("poppy12", "ik,motion,com,zmp", "double"),
-        ("poppy12", "ik,motion,com,zmp", "float"),
-        ("poppy12", "deflection", "float"),
-        ("poppy12", "links,jacobian,mass_matrix,inverse_dynamics", "double"),
-    ],
-)
-def test_generated_c_compiles_without_warnings_and_its_driver_passes(cli, tmp_path, robot, what, kind):
+@pytest.mark.parametrize(("robot", "what", "kind", "flag"), each_set_and_each_flag())
+def test_generated_c_compiles_without_warnings_and_its_driver_passes(cli, tmp_path, robot, what, kind, flag):
     flags = ["--float"] if kind == "float" else []
     done = cli("codegen", robot, "--what", what, *flags, "-o", str(tmp_path), "--json")
     assert done.code == 0
@@ -32,11 +45,10 @@ def test_generated_c_compiles_without_warnings_and_its_driver_passes(cli, tmp_pa
     assert {f"{robot}.c", f"{robot}.h", f"test_{robot}.c", "README.md"} == set(told["files"])
     sources = [str(tmp_path / name) for name in (f"test_{robot}.c", f"{robot}.c")]
     driver = str(tmp_path / "driver")
-    for flags in ((), ("-march=native",), ("-DSCREWKIN_SCALAR",)):
-        subprocess.run([native.compiler(), *WARNINGS, *flags, "-o", driver, *sources, "-lm"], check=True)
-        ran = subprocess.run([driver], check=False, capture_output=True, text=True)
-        assert ran.returncode == 0, ran.stdout
-        assert ran.stdout.count("largest difference") >= 2 * len(told["operations"])
+    subprocess.run([native.compiler(), *WARNINGS, flag, "-o", driver, *sources, "-lm"], check=True)
+    ran = subprocess.run([driver], check=False, capture_output=True, text=True)
+    assert ran.returncode == 0, ran.stdout
+    assert ran.stdout.count("largest difference") >= 2 * len(told["operations"])
 
 
 @needs_compiler

@@ -16,7 +16,7 @@ def shown(tmp_path_factory):
     folder = tmp_path_factory.mktemp("demo") / "out"
     story = io.StringIO()
     with contextlib.redirect_stdout(story):
-        code = run(["demo", "--gait", "smooth", "--steps", "2", "-o", str(folder)])
+        code = run(["demo", "--gait", "smooth", "--steps", "1", "-o", str(folder)])
     return code, story.getvalue(), folder
 
 
@@ -52,7 +52,7 @@ def test_a_walk_that_falls_ends_with_3_and_json_alone_on_stdout(cli, tmp_path):
 
     text = find_gait("paper").read_text(encoding="utf-8")
     gait.write_text(text.replace("sway = 1.0", "sway = 0.0"), encoding="utf-8")
-    called = cli("demo", "--gait", gait, "--steps", 2, "-o", "out", "--json")
+    called = cli("demo", "--gait", gait, "--steps", 1, "-o", "out", "--json")
     assert called.code == 3
     assert called.err == ""
     assert called.data["passed"] is False
@@ -67,7 +67,7 @@ def test_a_walk_too_fast_for_the_servos_is_shown_but_not_sent(cli, tmp_path):
     text = find_gait("walk").read_text(encoding="utf-8")
     gait = tmp_path / "hasty.toml"
     gait.write_text(text.replace("Tc = 1.5", "Tc = 0.8"), encoding="utf-8")
-    called = cli("demo", "--gait", gait, "--steps", 2, "-o", "out")
+    called = cli("demo", "--gait", gait, "--steps", 1, "-o", "out")
     assert called.code == 0
     assert "Refused: " in called.out
     assert "rad/s, its servo at most 6.00" in called.out

@@ -22,8 +22,7 @@ PACKAGES = {
 }
 """Libraries that an installation may lack, and the packages that hold them."""
 ABSENT = [
-    ["jax", "sympy"],
-    ["pybullet"],
+    ["jax", "sympy", "pybullet"],
     ["mujoco", "serial"],
     ["dynamixel_sdk", "matplotlib"],
     list(PACKAGES),
@@ -84,8 +83,10 @@ DRAWING = {"compare", "walk", "validate kinematic", "workspace", "stiffness", "r
 """What goes on without pictures, which stand beside its results."""
 
 CODE = """
-import contextlib, io, json, sys
+import contextlib, functools, io, json, sys
 sys.modules.update(dict.fromkeys(json.loads(sys.argv[1])))
+from screwkin.model import table
+table.parse_robot = functools.cache(table.parse_robot)  # as in conftest
 from screwkin.cli import run
 done = {}
 for name, words in json.loads(sys.argv[2]).items():

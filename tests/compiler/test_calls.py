@@ -15,7 +15,7 @@ from screwkin.compiler import calls, native
 from screwkin.compiler.run import machine_code, run
 from screwkin.dynamics.quantities import inverse_dynamics
 from screwkin.kinematics.body import center_of_mass
-from tests.kinematics.machines import random_state
+from tests.kinematics.machines import random_state, random_tree
 
 pytestmark = pytest.mark.skipif(
     not native.compiler() or not calls.possible(), reason="no C compiler, or no builtins"
@@ -189,8 +189,8 @@ def test_errors_of_allocation_pass_through() -> None:
 
 
 def test_a_number_may_be_a_float() -> None:
-    definition = inverse_dynamics.definition
-    door = definition.door(ROBOT, definition.inputs(ROBOT, ("gravity",)), ())
+    definition, robot = inverse_dynamics.definition, random_tree(0)
+    door = definition.door(robot, definition.inputs(robot, ("gravity",)), ())
     shapes = [group.shape for group in door.program.inputs]
     arrays = [np.eye(4) if s == (4, 4) else 9.81 if s == () else np.full(s, 0.1) for s in shapes]
     call = machine_code(door.guarded).checked(LIMIT, lambda batch: None)

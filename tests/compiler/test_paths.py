@@ -112,8 +112,14 @@ def test_centre_of_mass_momentum_and_zmp_are_those_of_the_formulas(path):
     assert GRAVITY == 9.81
 
 
-@pytest.mark.parametrize("path", PATHS)
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize(
+    ("seed", "path"),
+    [
+        pytest.param(seed, path, marks=pytest.mark.slow if path == "C" and seed > 1 else ())
+        for seed in range(6)
+        for path in PATHS
+    ],
+)
 def test_random_trees_of_turning_sliding_and_helical_joints(seed, path):
     robot = random_tree(seed)
     state = random_state(robot, seed, (20,))

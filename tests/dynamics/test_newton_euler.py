@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import sympy
 from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.linalg import expm
 
 import screwkin as sk
@@ -15,10 +14,9 @@ from screwkin.algebra.se3 import IDENTITY, NO_TWIST, UNTURNED, Vector
 from screwkin.dynamics.newton_euler import Bodies, composite_mass_matrix, wrench_and_efforts
 from screwkin.errors import ShapeError
 from screwkin.model.robot import Inertia, Joint, Link
-from tests.kinematics.machines import machine, random_state, random_tree
+from tests.kinematics.machines import machine, random_state, random_tree, seeds
 from tests.kinematics.test_positions import bracketed
 
-seeds = st.integers(0, 10_000)
 G = 9.81
 
 

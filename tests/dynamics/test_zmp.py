@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import screwkin as sk
 from screwkin.algebra.screws import Wrench, wrench_at
@@ -13,9 +12,8 @@ from screwkin.algebra.se3 import IDENTITY, ZERO, Vector, as_array, vector_from_a
 from screwkin.dynamics.zmp import cart_table_zmp, zmp_from_wrench
 from screwkin.model.robot import Inertia, Link
 from screwkin.model.table import load_robot
-from tests.kinematics.machines import machine, random_state, random_tree
+from tests.kinematics.machines import machine, random_state, random_tree, seeds
 
-seeds = st.integers(0, 10_000)
 G = 9.81
 
 

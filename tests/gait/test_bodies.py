@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
 import screwkin as sk
+from screwkin.algebra.screws import INFINITE, Screw
+from screwkin.algebra.se3 import UNTURNED, Pose, Vector
 from screwkin.errors import UnreachableError
-from screwkin.model.robot import Robot
+from screwkin.model.robot import Inertia, Joint, Link, Robot
 from screwkin.model.table import parse_robot
 from tests.bodies import LEG, SEVEN, humanoid
 
@@ -82,3 +85,62 @@ def test_a_leg_without_yaw_names_what_a_turn_needs() -> None:
 def test_arms_of_seven_joints_swing_alike_in_every_process() -> None:
     again = sk.walk(parse_robot(humanoid(**BODIES["seven"])), GAIT, 2)
     np.testing.assert_array_equal(again.q, walked("seven").q)
+
+
+PLACES = {
+    "neck": "torso",
+    "gripper": "right_forearm",
+    "toe": "left_foot_link",
+    "wheel": "right_calf",
+}
+PLAIN = sk.load_gait("turn").replace(rate=8)
+
+
+def with_joint(robot: Robot, parent: str, below: tuple[str, ...] = (), kind: str = "revolute") -> Robot:
+    """The robot with a massless link on a joint of its own; ``below`` names joints that then stand on it."""
+    s0, s = Vector(0.01, 0.02, 0.03), Vector(0.6, 0.0, 0.8)
+    screw = Screw(s, s0) if kind == "revolute" else Screw(s, s0, INFINITE)
+    added = Joint("added", parent, "added_link", kind, screw, -1.0, 1.0, 5.0, 5.0)
+    joints = tuple(replace(j, parent="added_link") if j.name in below else j for j in robot.joints)
+    link = Link("added_link", 0.0, s0, Inertia(0, 0, 0), Pose(UNTURNED, s0))
+    postures = tuple(replace(p, q=(*p.q, 0.0)) for p in robot.postures)
+    return replace(robot, links=(*robot.links, link), joints=(*joints, added), postures=postures, text="")
+
+
+@cache
+def plain() -> sk.Trajectory:
+    return sk.walk(sk.load_robot("bioloid"), PLAIN, 1)
+
+
+@pytest.mark.parametrize(
+    ("place", "kind"), [*((place, "revolute") for place in PLACES), ("gripper", "prismatic")]
+)
+def test_a_joint_that_no_limb_needs_rests_wherever_it_is(place: str, kind: str) -> None:
+    walk = sk.walk(with_joint(sk.load_robot("bioloid"), PLACES[place], kind=kind), PLAIN, 1)
+    assert not walk.q[:, -1].any()
+    assert not walk.qd[:, -1].any()
+    for field in ("q", "qd", "qdd"):
+        np.testing.assert_allclose(getattr(walk, field)[:, :-1], getattr(plain(), field), atol=1e-11)
+    np.testing.assert_allclose(walk.zmp, plain().zmp, atol=1e-12)
+
+
+@pytest.mark.parametrize("limb", ["hip_yaw", "shoulder_pitch"])
+def test_a_joint_below_both_legs_or_both_arms_rests(limb: str) -> None:
+    below = tuple(f"{side}_{limb}" for side in ("right", "left"))
+    walk = sk.walk(with_joint(sk.load_robot("bioloid"), "torso", below), PLAIN, 1)
+    np.testing.assert_allclose(walk.q[:, :-1], plain().q, atol=1e-11)
+    assert not walk.qdd[:, -1].any()
+
+
+def test_a_whole_body_is_confirmed_as_far_as_perfect_tracking_goes() -> None:
+    check = sk.validate(robot_of("no yaw"), walked("no yaw"), "kinematic")
+    assert check.reasons == ("engine kinematic simulates no forces and confirms nothing; use mujoco",)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["no yaw", "seven"])
+@pytest.mark.parametrize("engine", ["mujoco", "pybullet"])
+def test_whole_bodies_walk_in_both_engines(name: str, engine: str) -> None:
+    pytest.importorskip(engine)
+    walk = sk.walk(robot_of(name), GAIT.replace(rate=50), 2)
+    assert sk.validate(robot_of(name), walk, engine).passed  # type: ignore[arg-type]

@@ -162,7 +162,7 @@ def test_wrong_shapes_values_and_names_are_refused(robot: Robot) -> None:
         limb_ik(robot, "left_leg", T, guess=np.zeros(5))
     with pytest.raises(ShapeError, match="do not broadcast"):
         limb_ik(robot, "left_leg", np.broadcast_to(T, (3, 4, 4)), guess=np.zeros((2, 6)))
-    with pytest.raises(InputError, match="valid: auto, closed, hybrid"):
+    with pytest.raises(InputError, match="valid: auto, closed, branches, hybrid"):
         limb_ik(robot, "left_leg", T, "exact")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="left_arm has no closed form: it has 3 joints"):
         limb_ik(robot, "left_arm", T, "closed")

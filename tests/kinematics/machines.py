@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
+from hypothesis import strategies as st
 
 from screwkin.algebra.screws import INFINITE, Screw
 from screwkin.algebra.se3 import IDENTITY, Pose, Rotation, Twist, Vector, X, Z, exp, rotate, vector_from_array
@@ -13,6 +16,8 @@ from screwkin.kinematics.positions import link_displacements
 from screwkin.model.robot import Closure, Inertia, Joint, Limb, Link, Posture, Robot
 from screwkin.model.state import State
 
+seeds = st.integers(0, 10_000 if os.environ.get("HYPOTHESIS_PROFILE") == "many" else 11)
+"""Of random robots: few, so that tests share them and their programs, unless many are asked for."""
 TYPES = ("revolute", "revolute", "revolute", "prismatic", "helical")
 SPATIAL = ("px", "py", "pz", "rx", "ry", "rz")
 
@@ -70,6 +75,7 @@ def machine(
     )  # fmt: skip
 
 
+@cache
 def random_tree(seed: int, joints: int = 7, branching: bool = True, base: str = "floating") -> Robot:
     """Revolute, prismatic and helical joints in a random tree of heavy links."""
     rng = np.random.default_rng(seed)
@@ -119,6 +125,7 @@ def closed(robot: Robot, pairs: list[tuple[str, str]], seed: int) -> Robot:
     return replace(robot, closures=tuple(closures))
 
 
+@cache
 def random_mechanism(seed: int) -> Robot:
     """Closed at home: one loop, or two loops, or a floating base with a limb and a loop."""
     kind = seed % 3

@@ -5,15 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import screwkin as sk
 from screwkin.errors import InputError
 from screwkin.model.table import load_robot
-from tests.kinematics.machines import random_state, random_tree
+from tests.kinematics.machines import random_state, random_tree, seeds
 from tests.kinematics.test_positions import exponential_positions, moved
-
-seeds = st.integers(0, 10_000)
 
 
 @given(seed=seeds)

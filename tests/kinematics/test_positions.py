@@ -5,16 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.linalg import expm
 
 import screwkin as sk
 from screwkin.algebra.se3 import as_array
 from screwkin.kinematics.positions import chain_jacobian, screws_in, successive_displacement
 from screwkin.model.table import load_robot
-from tests.kinematics.machines import array_of, pose, random_state, random_tree
-
-seeds = st.integers(0, 10_000)
+from tests.kinematics.machines import array_of, pose, random_state, random_tree, seeds
 
 
 def bracketed(twist):

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import screwkin as sk
 from screwkin.algebra.se3 import ZERO, Twist
@@ -21,13 +20,12 @@ from screwkin.mechanism.least_values import least_values
 from screwkin.mechanism.network import blend
 from screwkin.mechanism.rates import secondary_accelerations, solve_rates
 from screwkin.mechanism.singularity import singularity_report
-from tests.kinematics.machines import random_mechanism
+from tests.kinematics.machines import random_mechanism, seeds
 from tests.laws.tables import as_pose, based, moved_base, necked, shuffled, slid, somewhere, waisted
 
 HUMANOIDS = ("bioloid", "bioloid24", "poppy12")
 LINKAGES = tuple(f"linkages/{name}" for name in ("four-bar", "slider-crank", "bennett", "rssr", "stewart"))
 BATCHES = (7, 101, 1000)
-seeds = st.integers(0, 10_000)
 
 
 def postures(robot: sk.Robot, count: int, seed: int) -> sk.State:

@@ -5,16 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import screwkin as sk
 from screwkin.algebra.se3 import Twist, Vector, as_array, exp
 from screwkin.mechanism.choice import mobility_at
 from screwkin.mechanism.scaling import referenced
 from screwkin.model.table import load_robot
-from tests.kinematics.machines import array_of, random_mechanism
-
-seeds = st.integers(0, 10_000)
+from tests.kinematics.machines import array_of, random_mechanism, seeds
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
-from hypothesis import strategies as st
 
 import screwkin as sk
 from screwkin.algebra.se3 import UNTURNED, as_array, pose_from_array, unstack
@@ -15,9 +14,8 @@ from screwkin.mechanism.closure import close_loops, closure_errors
 from screwkin.mechanism.least_values import least_values
 from screwkin.mechanism.network import coupling_twists, network_of_twists, twist_rates
 from screwkin.mechanism.rates import secondary_accelerations, solve_rates
-from tests.kinematics.machines import random_mechanism
+from tests.kinematics.machines import random_mechanism, seeds
 
-seeds = st.integers(0, 10_000)
 STEP = 2e-3
 STEPS = STEP * np.arange(-2, 3)
 

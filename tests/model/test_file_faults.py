@@ -64,7 +64,7 @@ def test_all_faults_of_all_kinds_are_told_at_once():
         ("mass = 2", "mass = -2\ncolour = 3"),
         ("thigh = 0.1", 'thigh = 0.1\nwidth = "width"'),
         ("s = [0, 1, 0]", "s = [0, 2, 0]"),
-        ("xx = 0.002", "xx = -0.2"),
+        (", zz = 0.001", ""),
         ('kind = "leg"', 'kind = "arm"'),
         ("right_hip = 0.5", "right_hop = 0.5"),
         ("upper = 1.5", "upper = -1.5"),

@@ -1,0 +1,40 @@
+"""Arms: the longest pair of mirrored branches beside the legs, as far as it is one chain."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from screwkin.anatomy.limbs import LEAST, Pair, Stance, depth
+from screwkin.anatomy.skeleton import Skeleton
+from screwkin.anatomy.symmetry import Symmetry
+
+
+def arms_of(skeleton: Skeleton, symmetry: Symmetry, stance: Stance) -> tuple[Pair | None, tuple[Pair, ...]]:
+    """The pair of arms, None without one, and the pairs that are neither arms nor legs."""
+    if not stance.others:
+        return None, ()
+    best = max(stance.others, key=lambda pair: _reach(skeleton, pair.one))
+    return best, tuple(pair for pair in stance.others if pair is not best)
+
+
+def _reach(skeleton: Skeleton, root: int) -> float:
+    """Greatest distance of what a branch carries from its root's axis point [m]."""
+    start = skeleton.place((skeleton.robot.tree[root].child,))
+    return max(float(np.linalg.norm(skeleton.place((name,)) - start)) for name in skeleton.links_beyond(root))
+
+
+def chains_of(skeleton: Skeleton, symmetry: Symmetry, pair: Pair) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Joints of both arms: down to where one is no single chain any more, or has no partner.
+
+    A branch that carries no further joint (a gear, one finger of a gripper) is no continuation; where
+    several carry some, or a joint follows another one, the hand begins.
+    """
+    first, own = [pair.one], len(skeleton.robot.joints)
+    while True:
+        further = skeleton.next(first[-1])
+        longer = [k for k in further if depth(skeleton, k) > 1] if len(further) > 1 else list(further)
+        if len(longer) != 1 or not symmetry.pairs[longer[0]] or longer[0] >= own:
+            break
+        first.append(longer[0])
+    second = tuple(int(symmetry.partner[i]) for i in first)
+    return (tuple(first), second) if len(first) >= LEAST else ((), ())

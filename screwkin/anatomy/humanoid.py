@@ -1,0 +1,222 @@
+"""A humanoid from a robot of unknown names: limbs, soles and home added, the base turned where it must be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import (
+    UNTURNED,
+    ZERO,
+    Pose,
+    Vector,
+    pose_from_array,
+    rotation_from_array,
+    vector_from_array,
+)
+from screwkin.anatomy import findings
+from screwkin.anatomy.arms import arms_of, chains_of
+from screwkin.anatomy.footing import Footing, footings
+from screwkin.anatomy.forward import Forward, forward_of
+from screwkin.anatomy.limbs import AnatomyError, Stance, root_of, stance_of
+from screwkin.anatomy.outline import Outline
+from screwkin.anatomy.postures import Legs, home_of
+from screwkin.anatomy.record import Anatomy
+from screwkin.anatomy.skeleton import Skeleton
+from screwkin.anatomy.soles import Foot, band_of, feet_of
+from screwkin.anatomy.symmetry import Symmetry, symmetry_of
+from screwkin.anatomy.turned import seen_from
+from screwkin.anatomy.written import commented_table
+from screwkin.errors import expect
+from screwkin.kinematics.limits import limits_of
+from screwkin.model.robot import Box, Limb, Link, Robot, Sole
+from screwkin.model.values import COUPLINGS
+
+SIDES = ("left", "right")
+
+
+def humanoid(robot: Robot) -> Robot:
+    """The robot with limbs, soles and the posture ``home``, from its geometry alone.
+
+    Args:
+        robot: of numbers, such as one read from URDF; names mean nothing. Limbs, soles and postures that it
+            has are replaced.
+
+    Returns:
+        The robot with limbs ``right_leg left_leg`` and, where it has any, ``right_arm left_arm``; x forward,
+        z up.
+
+    Raises:
+        AnatomyError: it does not stand on exactly two legs, or this cannot be seen; says why.
+    """
+    return anatomy(robot).robot
+
+
+def anatomy(robot: Robot) -> Anatomy:
+    """What a robot of unknown names is: limbs, soles, waist, which way is forward and up, and a home posture.
+
+    Args:
+        robot: of numbers, such as one read from URDF; names mean nothing.
+
+    Raises:
+        AnatomyError: it does not stand on exactly two legs, or this cannot be seen; says why.
+    """
+    expect(robot, Robot, "robot", "load_robot(...)")
+    skeleton = Skeleton.of(robot)
+    outline = Outline(robot, skeleton.size)
+    symmetry = symmetry_of(skeleton)
+    if symmetry is None:
+        raise AnatomyError(
+            f"{robot.name}: none of its {len(robot.tree)} joints is the mirror image of another one, so"
+            " that it has no left and right; a walk needs two mirrored legs"
+        )
+    stance = stance_of(skeleton, symmetry, outline)
+    feet = feet_of(skeleton, symmetry, stance, outline)
+    forward = forward_of(skeleton, symmetry, stance, feet)
+    return _built(robot, skeleton, symmetry, stance, feet, forward, outline)
+
+
+def _built(
+    robot: Robot,
+    skeleton: Skeleton,
+    symmetry: Symmetry,
+    stance: Stance,
+    feet: tuple[Foot, Foot],
+    forward: Forward,
+    outline: Outline,
+) -> Anatomy:
+    """The robot in its own axes, with what was found."""
+    left = np.cross(stance.up, forward.direction)
+    sense = 1.0 if left @ symmetry.normal > 0 else -1.0
+    R, offset = np.array([forward.direction, left, stance.up]), sense * symmetry.offset
+    R = np.where(np.abs(R - np.round(R)) < 1e-9, np.round(R), R) + 0.0
+    turn = rotation_from_array(R)
+    whole = robot if (np.eye(3) == R).all() else seen_from(robot, Pose(turn, ZERO))
+    own = [foot.turned(R) for foot in (feet if sense > 0 else feet[::-1])]
+    footing = footings(own[0], own[1], offset, stance.length, band_of(stance))
+    limbs = [_leg(whole, side, foot, at) for side, foot, at in zip(SIDES, own, footing, strict=True)]
+    soles = [Sole(f"{side}_leg", _points(at.places)) for side, at in zip(SIDES, footing, strict=True)]
+    arms, rest = arms_of(skeleton, symmetry, stance)
+    chains = chains_of(skeleton, symmetry, arms) if arms else ((), ())
+    for side, chain in zip(SIDES, chains if sense > 0 else chains[::-1], strict=True):
+        if chain:
+            limbs.append(_arm(whole, side, chain))
+    links = {link.name: link for link in whole.links}
+    for foot, at in zip(own, footing, strict=True):
+        links[foot.link] = _with_contact(links[foot.link], at, stance.length)
+    order = ("right_leg", "left_leg", "right_arm", "left_arm")
+    whole = replace(
+        whole,
+        base="floating",
+        links=tuple(links.values()),
+        limbs=tuple(sorted(limbs, key=lambda limb: order.index(limb.name))),
+        soles=tuple(soles[::-1]),
+        postures=(),
+        waist=None,
+        text="",
+    )
+    legs = _legs(whole, own, footing, skeleton, symmetry, R)
+    home = home_of(legs, _resting(whole))
+    whole = replace(whole, postures=(home.posture,))
+    kinds = [", ".join((foot.link, *foot.toes)) for foot in own]
+    both = list(zip(SIDES, own, footing, kinds, strict=True))[::-1]
+    sided = list(zip(SIDES, chains if sense > 0 else chains[::-1], strict=True))[::-1]
+    symmetric, faces = findings.of_symmetry(skeleton, symmetry), findings.of_forward(forward)
+    limb_findings = (
+        *(findings.of_leg(whole, side, foot, stance) for side, foot, _, _ in both),
+        *(findings.of_arm(whole, side, chain) for side, chain in sided if chain),
+    )
+    sole_findings = tuple(findings.of_sole(side, foot, at, kind) for side, foot, at, kind in both)
+    waist = findings.of_waist(whole, own, chains)
+    at_home = findings.of_home(home, stance.length)
+    remarks = findings.of_rest(whole, rest, list(outline.remarks))
+    found = Anatomy(whole, turn, symmetric, faces, limb_findings, sole_findings, waist, at_home, remarks)
+    return replace(found, robot=Robot.from_text(commented_table(found), robot.path))
+
+
+def _leg(robot: Robot, side: str, foot: Foot, at: Footing) -> Limb:
+    tip = _free_name(robot, f"{side}_foot")
+    return Limb(f"{side}_leg", "leg", foot.link, tip, pose_from_array(at.tip), COUPLINGS)
+
+
+def _arm(robot: Robot, side: str, chain: tuple[int, ...]) -> Limb:
+    """An arm's tip is the CoM of its hand, with axes as the base's."""
+    link = robot.tree[chain[-1]].child
+    skeleton = Skeleton.of(robot)
+    place = vector_from_array(skeleton.place(skeleton.links_beyond(chain[-1])))
+    return Limb(
+        f"{side}_arm", "arm", link, _free_name(robot, f"{side}_hand"), Pose(UNTURNED, place), COUPLINGS
+    )
+
+
+def _free_name(robot: Robot, name: str) -> str:
+    """A name for a tip that no link has."""
+    return name if name not in robot.link_names else _free_name(robot, f"{name}_tip")
+
+
+def _points(places: Array) -> tuple[Vector, ...]:
+    return tuple(vector_from_array(place) for place in places)
+
+
+THICK = 0.02
+"""Thickness of the plate for contact that a foot without boxes gets, by the leg's length."""
+
+
+def _with_contact(link: Link, at: Footing, length: float) -> Link:
+    """The foot with boxes for contact under its sole, if it has none that reach it.
+
+    Boxes have their edges along the base axes; under a sole that is not level in the zero pose there is a
+    small one at every corner.
+    """
+    floor = float(at.places[:, 2].min())
+    reach = [float(box.center.z) - float(box.size.z) / 2 for box in link.boxes]
+    if reach and min(reach) < floor + THICK * length / 4:
+        return link
+    thick = THICK * length
+    if at.level:
+        low, high = at.places.min(axis=0), at.places.max(axis=0)
+        center = (low + high) / 2 + (0, 0, thick / 2)
+        boxes = [Box(vector_from_array(center), vector_from_array(np.append((high - low)[:2], thick)))]
+    else:
+        edge = thick / 4
+        boxes = [
+            Box(vector_from_array(place + at.tip[:3, 2] * edge / 2), Vector(edge, edge, edge))
+            for place in at.places
+        ]
+    return replace(link, boxes=(*link.boxes, *boxes))
+
+
+def _resting(robot: Robot) -> Array:
+    """Joints at 0, or where their limits do not hold it, at the nearer one."""
+    lower, upper = limits_of(robot)
+    return np.clip(np.zeros(len(robot.joints)), lower, upper)
+
+
+def _legs(
+    robot: Robot,
+    feet: Sequence[Foot],
+    footing: Sequence[Footing],
+    skeleton: Skeleton,
+    symmetry: Symmetry,
+    R: Array,
+) -> Legs:
+    left, right = (foot.joints for foot in feet)
+    image = None
+    if [int(symmetry.partner[i]) for i in left] == list(right):
+        mirrored = (
+            skeleton.s[list(left)] - 2 * (skeleton.s[list(left)] @ symmetry.normal)[:, None] * symmetry.normal
+        )
+        image = -np.sign((mirrored * skeleton.s[list(right)]).sum(axis=1))
+        image = np.where(skeleton.turns[list(left)], image, -image)
+    return Legs(
+        robot=robot,
+        image=image,
+        middle=footing[0].middle,
+        hip=float((R @ root_of(skeleton, left[0]))[2]),
+        ankle=footing[0].ankle,
+        points=footing[0].kind == "point",
+        shared=len(robot.path_to(robot.tree[left[0]].parent)),
+    )

@@ -1,0 +1,186 @@
+"""Elimination for six revolute joints over arrays: which way is the most exact, and its programs.
+
+Three programs for every batch: the equations' table, the determinant at seventeen angles of the given joint,
+and at every zero of it the limb's angles. Nothing depends on a guess, so what is no zero is no solution.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from screwkin.algebra.arrays import Array, Integers
+from screwkin.algebra.harmonics import TOUCH, cells, crossing, derivatives, equal_angles, harmonics
+from screwkin.algebra.se3 import Pose, unstack
+from screwkin.compiler.program import Program, Recorder
+from screwkin.compiler.records import identifier, pose_input
+from screwkin.compiler.run import run
+from screwkin.ik.elimination import ANGLES, BRANCHES, Elimination, eliminations, vanishing
+from screwkin.ik.polish import polished
+from screwkin.ik.starts import spread
+from screwkin.kinematics.serial_chain import SerialChain, cached, forward
+
+BLOCK = 512
+"""Samples computed together, which bounds the memory of a large batch."""
+POSES = 24
+"""Poses at which the ways to eliminate are compared."""
+EXACT_ENOUGH = 1e-9
+"""Error of the given joint [rad] that costs no branches but those that nearly fall together."""
+USABLE = 1e-5
+"""Error [rad] above which the determinant vanishes for all poses alike."""
+STEP = 1e-4
+"""Difference of angles [rad] from which the slope of the determinant is computed."""
+ROUNDING = 1e-15
+"""Rounding of the determinant over its largest value."""
+
+
+@cached
+def elimination(chain: SerialChain, largest: float = EXACT_ENOUGH) -> Elimination | None:
+    """The most exact way to eliminate for a limb.
+
+    None where none has errors of the given joint up to ``largest`` [rad] at nine of ten poses; any way with
+    as few as ``EXACT_ENOUGH`` is taken without trying others.
+    """
+    if len(chain.screws) != 6 or not chain.turning.all():
+        return None
+    low = np.where(np.isfinite(chain.lower), chain.lower, -np.pi)
+    high = np.where(np.isfinite(chain.upper), chain.upper, np.pi)
+    q = low + spread(6, POSES, 0) * (high - low)
+    tips, _ = forward(chain.screws, unstack(q), chain.tip)
+    best = None
+    for way in eliminations(chain):
+        error = float(np.quantile(_errors(way, tips, q), 0.9))
+        if error <= largest:
+            best, largest = way, error
+        if error <= EXACT_ENOUGH:
+            break
+    return best
+
+
+def _errors(way: Elimination, tips: Pose, q: Array) -> Array:
+    """How far zeros of the determinant are from the given joint's angles (B,), by value and slope there."""
+    D, x = way.displacement(tips), q[:, 5 - way.given if way.backwards else way.given]
+    table = np.array([[np.broadcast_to(entry, x.shape) for entry in part] for part in way.table(D)])
+    around = np.concatenate([equal_angles(ANGLES)[:, None] + 0 * x, [x, x + STEP, x - STEP]])
+    values = np.asarray(vanishing(list(_at(table.swapaxes(0, 1), around))))
+    here, after, before = values[ANGLES:]
+    scale = np.abs(values[:ANGLES]).max(axis=0) * ROUNDING
+    slope = np.abs(after - before) / (2 * STEP)
+    return (np.abs(here) + scale) / np.where(slope > 0, slope, 1e-300)
+
+
+def _at(table: Array, x: Array) -> Array:
+    """Matrices (54, ...) of the given joint's angles x (..., B) from their coefficients (54, 3, B)."""
+    fixed, cosine, sine = (table[:, k].reshape(len(table), *(1,) * (x.ndim - 1), -1) for k in range(3))
+    return np.asarray(fixed + np.cos(x) * cosine + np.sin(x) * sine)
+
+
+def eliminated(chain: SerialChain, target: Array) -> tuple[Array, Array]:
+    """The branches of a limb that has an elimination.
+
+    Args:
+        chain: of the limb.
+        target: exact poses of the tip (B, 4, 4).
+
+    Returns:
+        q (B, 16, 6); error (B, 16) [m and rad, norm], infinite where there is no branch.
+    """
+    q, error = np.zeros((len(target), BRANCHES, 6)), np.full((len(target), BRANCHES), np.inf)
+    for start in range(0, len(target), BLOCK):
+        owner, angles, far = _candidates(chain, target[start : start + BLOCK])
+        place = np.arange(len(owner)) - np.searchsorted(owner, owner)
+        few = place < BRANCHES
+        q[start + owner[few], place[few]] = angles[few]
+        error[start + owner[few], place[few]] = far[few]
+    return q, error
+
+
+def _candidates(chain: SerialChain, target: Array) -> tuple[Integers, Array, Array]:
+    """Sample (R,), angles (R, 6) and error (R,) of every zero of the determinant."""
+    table = run(equations(chain), {"target": target})["table"]
+    x = equal_angles(ANGLES)
+    matrices = np.stack([np.ones(ANGLES), np.cos(x), np.sin(x)], axis=1) @ table
+    owner, zero = _zeros(run(values(), {"matrix": matrices})["value"][..., 0])
+    circle = np.stack([np.cos(zero), np.sin(zero)], axis=1)
+    out = run(branch(chain), {"target": target[owner], "circle": circle, "table": table[owner]})
+    return owner, out["q"], out["error"][:, 0]
+
+
+def _zeros(value: Array) -> tuple[Integers, Array]:
+    """Index (R,), ascending, and angle (R,) of the zeros of polynomials from their values (B, 17)."""
+    terms = harmonics(value)
+    owner, low, high, dips, negative = cells(terms)
+    at = owner[dips]
+    ends = {"low": low[dips, None], "high": high[dips, None]}
+    out = run(zero(1), {"terms": terms[at], **ends})
+    bottom, depth = out["angle"], out["value"][:, 0]
+    crossed = (depth < 0) != negative[dips]
+    touched = ~crossed & (np.abs(depth) <= TOUCH)
+    lows = [low[~dips], low[dips][crossed], bottom[crossed, 0]]
+    highs = [high[~dips], bottom[crossed, 0], high[dips][crossed]]
+    owners = np.concatenate([owner[~dips], at[crossed], at[crossed]])
+    ends = {"low": np.concatenate(lows)[:, None], "high": np.concatenate(highs)[:, None]}
+    found = run(zero(0), {"terms": terms[owners], **ends})["angle"][:, 0]
+    owners, found = np.concatenate([owners, at[touched]]), np.concatenate([found, bottom[touched, 0]])
+    order = np.lexsort((found, owners))
+    return owners[order], found[order]
+
+
+@cache
+def zero(order: int) -> Program:
+    """Where a polynomial or its slope (``order`` 1) changes its sign between two angles; its value there."""
+    recorder = Recorder(
+        f"crossing_{order}", "Where a trigonometric polynomial or its slope changes its sign."
+    )
+    terms = recorder.input("terms", ANGLES + 1)
+    (low,), (high,) = recorder.input("low", 1), recorder.input("high", 1)
+    x = crossing(terms, low, high, order)
+    recorder.output("angle", [x])
+    recorder.output("value", derivatives(terms, x, (0,)))
+    return recorder.program()
+
+
+@cached
+def equations(chain: SerialChain) -> Program:
+    """The table of ``Elimination`` for a pose of the tip."""
+    way = elimination(chain, USABLE)
+    assert way is not None
+    recorder = Recorder(
+        identifier(chain.limb, "equations"),
+        f"Six equations in two joints of {chain.limb}: coefficients of 1, cosine and sine of a third joint.",
+    )
+    table = way.table(way.displacement(pose_input(recorder, "target")))
+    recorder.output("table", [x for part in table for x in part], 3, 54)
+    return recorder.program()
+
+
+@cache
+def values() -> Program:
+    """The determinant that vanishes at a solution."""
+    recorder = Recorder("dialytic_determinant", "What vanishes where six equations have a common solution.")
+    recorder.output("value", [vanishing(recorder.input("matrix", 54))])
+    return recorder.program()
+
+
+@cached
+def branch(chain: SerialChain) -> Program:
+    """The positions of a limb for one zero of the determinant."""
+    way = elimination(chain, USABLE)
+    assert way is not None
+    recorder = Recorder(
+        identifier(chain.limb, "branch"),
+        f"Joint positions of {chain.limb} for an angle of one joint at which six equations have a common"
+        " solution, after Newton steps; error: norm of the residual [m and rad].",
+    )
+    target, (c, s) = pose_input(recorder, "target"), recorder.input("circle", 2)
+    q = way.branch(way.displacement(target), c, s, recorder.input("table", 3, 54))
+    q, error = polished(chain, q, target)
+    recorder.output("q", q)
+    recorder.output("error", [error])
+    return recorder.program()
+
+
+def elimination_programs(chain: SerialChain) -> list[Program]:
+    """What ``eliminated`` runs for a limb."""
+    return [equations(chain), values(), zero(0), zero(1), branch(chain)]

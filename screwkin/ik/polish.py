@@ -1,0 +1,78 @@
+"""Newton steps of single branches: what makes a solution of one that is near."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.scalar import Scalar, larger, least, where
+from screwkin.algebra.screws import at
+from screwkin.algebra.se3 import Pose, Twist, cross
+from screwkin.compiler.program import Program, Recorder
+from screwkin.compiler.records import identifier, pose_input
+from screwkin.compiler.run import run
+from screwkin.kinematics.serial_chain import SerialChain, cached, forward, miss
+from screwkin.mechanism.limb_rates import pose_rates
+
+NEWTON = 2
+"""Newton steps at once: elimination leaves errors of some 1e-10, seldom 1e-4."""
+ROUGH = 1e-13
+"""Error of a branch [m and rad] that needs more steps; near a double root they are many."""
+NEAR = 1e-2
+"""Error after the first steps above which a branch is none."""
+ROUNDS = 12
+"""Bound on the rounds of Newton steps there."""
+LONGEST = 0.3
+"""Largest change of an angle in such a step [rad]."""
+
+
+def polished(chain: SerialChain, q: Sequence[Scalar], target: Pose) -> tuple[list[Scalar], Scalar]:
+    """The best of some positions and what Newton steps make of them, and its error."""
+    best, error = list(q), miss(chain, q, target)
+    for _ in range(NEWTON):
+        q = _newton_step(chain, q, target)
+        new = miss(chain, q, target)
+        better = new < error
+        best = [where(better, x, y) for x, y in zip(q, best, strict=True)]
+        error = where(better, new, error)
+    return best, error
+
+
+def _newton_step(chain: SerialChain, q: Sequence[Scalar], target: Pose) -> list[Scalar]:
+    tip, columns = forward(chain.screws, q, chain.tip)
+    pairs = zip((tip.R.x, tip.R.y, tip.R.z), (target.R.x, target.R.y, target.R.z), strict=True)
+    x, y, z = (cross(here, there) for here, there in pairs)
+    wanted = Twist((x + y + z) * 0.5, target.p - tip.p)
+    rates, _ = pose_rates([at(tip.p, column) for column in columns], None, wanted, chain.length)
+    return [x + larger(-LONGEST, least(rate, LONGEST)) for x, rate in zip(q, rates, strict=True)]
+
+
+@cached
+def steps(chain: SerialChain) -> Program:
+    """Some Newton steps of a limb."""
+    recorder = Recorder(
+        identifier(chain.limb, "newton"), f"Newton steps of {chain.limb} towards a pose of its tip."
+    )
+    q, error = polished(chain, recorder.input("start", len(chain.screws)), pose_input(recorder, "target"))
+    recorder.output("q", q)
+    recorder.output("error", [error])
+    return recorder.program()
+
+
+def iterated(chain: SerialChain, q: Array, error: Array, target: Array) -> None:
+    """Repeat Newton steps where they help, in place: near a singular position many are needed.
+
+    Args:
+        chain: of six joints.
+        q: branches (B, k, 6).
+        error: of them (B, k) [m and rad, norm].
+        target: exact poses of the tip (B, 4, 4).
+    """
+    owner, k = ((error > ROUGH) & (error < NEAR)).nonzero()
+    for _ in range(ROUNDS):
+        out = run(steps(chain), {"start": q[owner, k], "target": target[owner]})
+        better = out["error"][:, 0] < error[owner, k]
+        owner, k = owner[better], k[better]
+        q[owner, k], error[owner, k] = out["q"][better], out["error"][better, 0]
+        more = error[owner, k] > ROUGH
+        owner, k = owner[more], k[more]

@@ -1,0 +1,101 @@
+"""The bundled robots stripped of limbs, soles and postures, and described otherwise: the same anatomy."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from screwkin.algebra.se3 import as_array
+from screwkin.anatomy.humanoid import anatomy
+from screwkin.dynamics.support import convex_hull, sole_corners
+from screwkin.kinematics.body import frame_pose
+from screwkin.model.library import robot_names
+from screwkin.model.state import home
+from screwkin.model.table import load_robot
+from tests.laws.descriptions import mirrored, reordered, slid
+
+NAMES = [name for name in robot_names() if load_robot(name).limbs]
+TIP, AREA = 1e-9, 0.05
+"""How far a foot's frame may be from the table's [m], and its area [share]."""
+
+
+def stripped(robot):
+    return replace(robot, limbs=(), soles=(), postures=(), waist=None, text="")
+
+
+def area(corners):
+    hull = convex_hull(corners)
+    x, y = hull.T
+    return 0.5 * abs(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+
+
+@pytest.fixture(scope="module", params=NAMES)
+def pair(request):
+    """A bundled robot, and what is read off it without its limbs."""
+    robot = load_robot(request.param)
+    return robot, anatomy(stripped(robot))
+
+
+def test_a_robot_without_limbs_gives_them_back(pair):
+    robot, seen = pair
+    assert {limb.name: limb.link for limb in seen.robot.limbs} == {
+        limb.name: limb.link for limb in robot.limbs
+    }
+    for limb in robot.limbs:
+        if limb.kind == "leg":
+            np.testing.assert_allclose(
+                as_array(seen.robot.limb(limb.name).frame), as_array(limb.frame), atol=TIP
+            )
+
+
+def test_a_robot_without_soles_gives_them_back(pair):
+    robot, seen = pair
+    for sole in robot.soles:
+        mine, theirs = (sole_corners(r, r.limb(sole.limb).tip)[:, :2] for r in (seen.robot, robot))
+        assert area(mine) == pytest.approx(area(theirs), rel=AREA)
+        np.testing.assert_allclose(mine.mean(axis=0), theirs.mean(axis=0), atol=3e-3)
+
+
+def test_it_stands_as_high_as_by_its_own_table(pair):
+    robot, seen = pair
+    heights = [one.posture("home").base_height for one in (seen.robot, robot)]
+    assert heights[0] == pytest.approx(heights[1], rel=0.08)
+
+
+def test_neither_order_of_rows_nor_points_of_axes_matter(pair):
+    robot, seen = pair
+    bare = stripped(robot)
+    rng = np.random.default_rng(4)
+    shifts = {name: rng.uniform(-0.3, 0.3) for name in bare.joint_names}
+    joints, links = rng.permutation(len(bare.joints)), rng.permutation(len(bare.links))
+    other = anatomy(reordered(slid(bare, shifts), list(joints), list(links), [])).robot
+    assert [(limb.name, limb.link) for limb in other.limbs] == [
+        (limb.name, limb.link) for limb in seen.robot.limbs
+    ]
+    for limb in other.limbs:
+        if limb.kind == "leg":
+            np.testing.assert_allclose(
+                as_array(limb.frame), as_array(seen.robot.limb(limb.name).frame), atol=1e-9
+            )
+    a, b = (dict(zip(r.joint_names, r.posture("home").q, strict=True)) for r in (other, seen.robot))
+    assert max(abs(a[name] - b[name]) for name in a) < 1e-6
+
+
+def test_the_mirrored_robot_has_the_mirrored_anatomy(pair):
+    robot, seen = pair
+    image, names = mirrored(stripped(robot))
+    other = anatomy(image).robot
+    for limb in seen.robot.limbs:
+        side = other.limb(limb.name)
+        assert side.link == seen.robot.limb(limb.name).link  # its names are swapped as well
+    a, b = (dict(zip(r.joint_names, r.posture("home").q, strict=True)) for r in (seen.robot, other))
+    for name, (there, sign) in names.items():
+        assert b[there] == pytest.approx(sign * a[name], abs=1e-5)  # its lines are mirrored to 1e-6 m
+
+
+def test_home_is_symmetric(pair):
+    _, seen = pair
+    state = home(seen.robot)
+    left, right = (frame_pose(seen.robot, state, foot) for foot in ("left_foot", "right_foot"))
+    np.testing.assert_allclose(left[:3, 3] * (1, -1, 1), right[:3, 3], atol=1e-6)
+    np.testing.assert_allclose(left[:3, :3], np.eye(3), atol=1e-8)

@@ -1,0 +1,160 @@
+"""Six joints without closed form: all branches, each certified by its residual."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import screwkin as sk
+from screwkin.algebra.linear import determinant, null_vector
+from screwkin.errors import InputError
+from screwkin.ik.all_branches import has_branches
+from screwkin.ik.closed import recognised
+from screwkin.ik.methods import solve_limb_arrays
+from screwkin.ik.numeric import IkSettings
+from screwkin.ik.solutions import LimbSolutions
+from screwkin.kinematics.serial_chain import SerialChain
+from screwkin.kinematics.status import Status
+from tests.ik.legs import Leg, apart, offset_leg, random_tip, spherical_leg, unit
+from tests.laws.limbs import inside, random_robot, targets_at
+
+LOW = np.array([-2.0, -0.5, -2.0, -0.1, -0.9, -0.4])
+HIGH = np.array([1.5, 1.5, 2.0, 2.5, 0.9, 0.4])
+
+
+def pairs_leg() -> Leg:
+    """A leg of pairs: pitch and tilted roll 30 mm apart, a yaw that meets the roll, a knee parallel to the
+    ankle's pitch, an ankle's roll 18 mm below."""
+    tilt = 0.17
+    axes = [[0, 1, 0], [np.cos(tilt), 0, np.sin(tilt)], [-np.sin(tilt), 0, np.cos(tilt)]]
+    axes += [[0, 1, 0], [0, 1, 0], [1, 0, 0]]
+    points = [[0, 0.06, -0.1], [0, 0.11, -0.13], [0.05, 0.11, -0.25], [0, 0.11, -0.44]]
+    points += [[0, 0.11, -0.74], [0, 0.11, -0.758]]
+    tip = np.eye(4)
+    tip[:3, 3] = [0, 0.11, -0.79]
+    return Leg(np.array(axes, dtype=float), np.array(points, dtype=float), tip)
+
+
+def nearly(leg: Leg, size: float, seed: int) -> Leg:
+    """Axes turned and moved by a little: what a table that was measured or rounded holds."""
+    rng = np.random.default_rng(seed)
+    axes = leg.axes + size * rng.normal(size=(6, 3))
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    return replace(leg, axes=axes, points=leg.points + 0.3 * size * rng.normal(size=(6, 3)))
+
+
+def random_leg(seed: int) -> Leg:
+    rng = np.random.default_rng(seed)
+    return Leg(unit(rng, 6), 0.3 * rng.normal(size=(6, 3)), random_tip(rng))
+
+
+LEGS = {
+    "pairs": pairs_leg(),
+    "random": random_leg(0),
+    "parallel to 2e-3": nearly(offset_leg(), 2e-3, 1),
+    "meeting to 2e-3": nearly(spherical_leg(), 2e-3, 2),
+    "parallel to 1e-6": nearly(offset_leg(), 1e-6, 3),
+    "meeting to 1e-6": nearly(spherical_leg(), 1e-6, 4),
+    "meeting to 5e-5": nearly(spherical_leg(), 5e-5, 5),
+}
+
+
+def limited(leg: Leg) -> SerialChain:
+    return replace(leg.chain(), lower=LOW, upper=HIGH)
+
+
+def solved(chain: SerialChain, T: np.ndarray, guess: np.ndarray | None = None) -> LimbSolutions:
+    start = np.zeros(6) if guess is None else guess
+    return solve_limb_arrays(chain, T, "auto", start, IkSettings(), True)
+
+
+def assert_own_branch(leg: Leg, count: int, share: float, seed: int = 0) -> None:
+    chain = limited(leg)
+    assert recognised(chain) is None
+    q = np.random.default_rng(seed).uniform(LOW, HIGH, (count, 6))
+    T = leg.reach(q)
+    found = solved(chain, T)
+    assert found.method == "branches"
+    own = (apart(found.q, q[:, None]) < 1e-6) & found.valid
+    assert own.any(axis=1).mean() >= share
+    assert found.in_limits.any(axis=1).mean() >= share
+    sample, k = found.valid.nonzero()
+    miss = np.abs(leg.reach(found.q[sample, k]) - T[sample]).max(axis=(1, 2))
+    assert miss.max() < 1e-11
+
+
+@pytest.mark.parametrize("name", LEGS)
+def test_the_own_branch_is_found_and_every_branch_is_a_solution(name: str) -> None:
+    assert_own_branch(LEGS[name], 150, 0.99)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", LEGS)
+def test_the_own_branch_is_found_in_thousands_of_poses(name: str) -> None:
+    assert_own_branch(LEGS[name], 10_000, 0.999)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(20))
+def test_the_own_branch_of_perturbed_legs_is_found(seed: int) -> None:
+    assert_own_branch(nearly(pairs_leg(), 10.0 ** -(seed % 5), seed), 2000, 0.995)
+
+
+def test_a_pose_alone_has_the_branches_that_it_has_in_a_batch() -> None:
+    leg = pairs_leg()
+    chain, T = limited(leg), leg.reach(np.random.default_rng(5).uniform(LOW, HIGH, (105, 6)))
+    whole = solved(chain, T)
+    for k in range(4):
+        alone = solved(chain, T[k])
+        np.testing.assert_array_equal(alone.valid, whole.valid[k])
+        np.testing.assert_allclose(alone.q, whole.q[k], atol=1e-9)
+
+
+def test_a_pose_out_of_reach_ends_at_the_nearest() -> None:
+    leg = pairs_leg()
+    T = leg.reach(np.zeros((1, 6)))
+    T[:, 2, 3] -= 0.2
+    found = solved(limited(leg), T)
+    assert found.status == Status.UNREACHABLE
+    assert 0.1 < found.residual[0, 0] < 0.3
+
+
+def test_a_singular_pose_is_solved() -> None:
+    """The knee's axis, and the hip's and ankle's points in one line with it: two branches fall together."""
+    leg = pairs_leg()
+    q = np.zeros((1, 6))
+    q[0, 3] = 0.0
+    found = solved(limited(leg), leg.reach(q))
+    assert found.status == Status.CONVERGED
+
+
+def test_whole_bodies_and_limbs_agree_about_limbs_without_closed_form() -> None:
+    robot = random_robot(0)
+    targets = targets_at(robot, inside(robot, 20, 0))
+    solution = sk.solve_pose(robot, targets)
+    assert solution.ok
+    for limb in robot.limbs:
+        chain = SerialChain.of(robot, limb.name)
+        best = sk.limb_ik(robot, limb.name, targets[limb.tip]).best
+        np.testing.assert_allclose(solution.state.q[:, list(chain.joints)], best, atol=1e-9)
+
+
+def test_branches_are_refused_where_it_does_not_fit() -> None:
+    robot = random_robot(1)
+    T = np.eye(4)
+    with pytest.raises(InputError, match="six revolute joints"):
+        sk.limb_ik(robot, "left_arm", T, "branches")
+    assert not has_branches(SerialChain.of(robot, "left_arm"))
+
+
+def test_reflections_give_determinants_and_null_vectors() -> None:
+    rng = np.random.default_rng(0)
+    for n in (1, 2, 5, 6):
+        A = rng.normal(size=(n, n))
+        assert determinant(A.tolist()) == pytest.approx(np.linalg.det(A))
+    A[-1] = A[0] + A[1]
+    assert np.abs(A @ null_vector(A.tolist())).max() < 1e-13
+    A[:, 0] = 0.0
+    assert null_vector(A.tolist())[0] != 0
