@@ -47,9 +47,8 @@ def test_what_is_accepted_passes_when_it_was_played(
     walked: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     accepted = [rate for rate in RATES if is_accepted(walked, rate)]
-    assert accepted == list(RATES[RATES.index(accepted[0]) :]), "what is accepted at a rate is so above it"
-    assert 50 in accepted
-    for rate in (accepted[0], 2 * accepted[0], 50, 100, 200, 300):
+    assert set(accepted) >= {rate for rate in RATES if rate >= 50}
+    for rate in (*accepted[:2], 50, 100, 200, 300):
         out = tmp_path / str(rate)
         words = ["send", str(walked), "--rate", str(rate), "--virtual", "--go", "-o", str(out)]
         assert run(words) == 0, rate

@@ -72,8 +72,10 @@ class Played:
             assert refused.exit_code == 4, f"{what}: {refused}"
             assert len(str(refused)) > 20
             return
-        assert ticks.shape == self.ticks.shape, what
-        assert np.abs(ticks - self.ticks).max() <= 1, f"{what} is played, and is another walk"
+        frames = max(len(ticks), len(self.ticks))  # the last frame is held
+        own, was = (np.pad(t, ((0, frames - len(t)), (0, 0)), mode="edge") for t in (ticks, self.ticks))
+        assert frames <= len(self.ticks) + 1, what
+        assert np.abs(own - was).max() <= 1, f"{what} is played, and is another walk"
 
 
 @pytest.fixture(scope="module")
