@@ -42,7 +42,8 @@ class Physics:
     """Settings of the simulation.
 
     dt [s]; solver of motors and contacts: ``direct`` (Dantzig's pivoting, exact) or ``iterative`` (projected
-    Gauss-Seidel, with so many iterations; elastic soles need it, and it takes over where pivoting fails);
+    Gauss-Seidel, with so many iterations; elastic soles and coupled joints need it, and it takes over where
+    pivoting fails);
     regularisation of the direct one, as redundant contacts share a force in many ways; friction between soles
     and floor; gravity [m/s^2]; sole_stiffness [N/m] and sole_damping [N s/m] of every point in which a leg's
     last link touches the floor, None for rigid soles.
@@ -102,7 +103,7 @@ class PyBulletBackend:
         self.servo = self._servos.name
         self._physics = physics or Physics()
         _check_soles(self._physics)
-        if self._physics.sole_stiffness is not None:
+        if robot.coupled or self._physics.sole_stiffness is not None:
             self._physics = replace(self._physics, solver="iterative")
         self.dt = self._physics.dt
         self.settings: Mapping[str, Any] = asdict(self._physics)
