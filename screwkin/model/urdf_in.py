@@ -119,7 +119,7 @@ def parse_urdf(
         del links[base]
         base = free.child
     links, joints = decomposed(reader, links, joints)
-    names, shapes = _unique_names(reader, links), shape_reader(reader, root, Path(path).parent)
+    names, shapes = _unique_names(reader, links, base), shape_reader(reader, root, Path(path).parent)
     bodies = _bodies(base, joints, names)
     for name, element in links.items():
         _add_mass(reader, bodies[name], name, element, repair)
@@ -242,10 +242,10 @@ def _bodies(base: str, joints: Sequence[Edge], names: Mapping[str, str]) -> dict
     return body
 
 
-def _unique_names(reader: Reader, links: Iterable[str]) -> dict[str, str]:
-    """Names that a table allows, one for each link."""
+def _unique_names(reader: Reader, links: Iterable[str], base: str) -> dict[str, str]:
+    """Names that a table allows, one for each link; only the base link may be called ``base``."""
     names: dict[str, str] = {}
-    taken = set[str]()
+    taken = {"base"} - {base}
     for link in links:
         name = _name(link)
         while name in taken:

@@ -103,6 +103,15 @@ def read_root(text: str, path: str) -> Element:
     return root
 
 
+def links_without_inertia(text: str, path: str) -> int:
+    """Number of the links of a URDF that say nothing of their inertia.
+
+    Raises:
+        TableError: the text is no URDF.
+    """
+    return sum(link.find("inertial") is None for link in read_root(text, path).findall("link"))
+
+
 def _is_xacro(root: Element) -> bool:
     """Whether macros of xacro, or its expressions, are still to be expanded."""
     return any(
