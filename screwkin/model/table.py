@@ -48,13 +48,13 @@ def load_robot(name_or_path: str | Path, symbolic: bool = False) -> Robot:
 
 
 def _file_in(path: Path) -> Path:
-    """The one URDF file of a folder, such as a package of ROS; of a file the file itself."""
-    if not path.is_dir():
-        return path
-    files = sorted(file for file in path.rglob("*") if file.suffix.lower() == ".urdf")
-    if len(files) != 1:
-        raise UnknownNameError("robot, for a folder", str(path), [str(file) for file in files])
-    return files[0]
+    """The one URDF file of a folder, such as a package of ROS; else the path itself."""
+    files = (
+        sorted(file for file in path.rglob("*") if file.suffix.lower() == ".urdf") if path.is_dir() else []
+    )
+    if len(files) > 1:
+        raise UnknownNameError("robot, for a folder with several,", str(path), [str(file) for file in files])
+    return files[0] if files else path
 
 
 def robot_from_text(text: str, name: str = "<text>", symbolic: bool = False) -> Robot:
