@@ -171,8 +171,9 @@ def _arm(robot: Robot, side: str, chain: tuple[int, ...]) -> Limb:
 
 
 def _free_name(robot: Robot, name: str) -> str:
-    """A name for a tip that no link has."""
-    return name if name not in robot.link_names else _free_name(robot, f"{name}_tip")
+    """A name for a tip that no link or frame has."""
+    taken = {*robot.link_names, *(frame.name for frame in robot.frames)}
+    return name if name not in taken else _free_name(robot, f"{name}_tip")
 
 
 def _points(places: Array) -> tuple[Vector, ...]:
