@@ -19,7 +19,7 @@ from screwkin.algebra.se3 import (
 )
 from screwkin.anatomy import findings
 from screwkin.anatomy.arms import arms_of, chains_of
-from screwkin.anatomy.footing import Footing, footings
+from screwkin.anatomy.footing import LEVEL, Footing, footings
 from screwkin.anatomy.forward import Forward, forward_of
 from screwkin.anatomy.limbs import AnatomyError, Stance, root_of, stance_of
 from screwkin.anatomy.outline import Outline
@@ -31,11 +31,15 @@ from screwkin.anatomy.symmetry import TILT, Symmetry, symmetry_of
 from screwkin.anatomy.turned import seen_from
 from screwkin.anatomy.written import commented_table
 from screwkin.errors import expect
+from screwkin.kinematics.body import frame_pose
 from screwkin.kinematics.limits import limits_of
-from screwkin.model.robot import Box, Limb, Link, Robot, Sole
+from screwkin.model.robot import Box, Limb, Link, Posture, Robot, Sole
+from screwkin.model.state import State
 from screwkin.model.values import COUPLINGS
 
 SIDES = ("left", "right")
+EVEN = 0.01
+"""Difference of height, by the leg's length, at which both feet stand on one floor."""
 ASIDE = 10.0
 """Tilt in the zero pose [deg] beyond which an edge or a point is nothing to stand on."""
 
@@ -122,7 +126,7 @@ def _built(
         text="",
     )
     legs = _legs(whole, own, footing, skeleton, symmetry, R)
-    home = home_of(legs, _resting(whole))
+    home = home_of(legs, _resting(whole, robot.postures, stance.length))
     whole = replace(whole, postures=(home.posture,))
     parts = [(foot.link, *foot.toes) for foot in own]
     both = list(zip(SIDES, own, footing, parts, strict=True))[::-1]
@@ -204,9 +208,29 @@ def _with_contact(link: Link, at: Footing, length: float) -> Link:
     return replace(link, boxes=(*link.boxes, *boxes))
 
 
-def _resting(robot: Robot) -> Array:
-    """Joints at 0, or where their limits do not hold it, at the nearer one."""
+def _resting(robot: Robot, given: Sequence[Posture], length: float) -> Array:
+    """Positions (n,) of joints that no leg has at home, and where the legs' solution begins.
+
+    Those of the given posture that stands lowest on level soles, as files of a maker's own tools have them;
+    else 0, or where limits do not hold 0, the nearer one.
+
+    Args:
+        robot: with limbs.
+        given: postures of the robot as it came.
+        length: of the legs [m].
+    """
     lower, upper = limits_of(robot)
+    standing: list[tuple[float, Array]] = []
+    for posture in given:
+        q = np.clip(posture.q, lower, upper)
+        state = State(np.eye(4), q)
+        feet = [frame_pose(robot, state, limb.tip) for limb in robot.limbs if limb.kind == "leg"]
+        level = min(foot[2, 2] for foot in feet) > np.cos(np.radians(LEVEL))
+        apart = abs(feet[0][2, 3] - feet[1][2, 3])
+        if level and apart < EVEN * length:
+            standing.append((-float(feet[0][2, 3]), q))
+    if standing:
+        return min(standing, key=lambda one: one[0])[1]
     return np.clip(np.zeros(len(robot.joints)), lower, upper)
 
 

@@ -88,3 +88,14 @@ def test_home_is_symmetric(pair):
     left, right = (frame_pose(seen.robot, state, foot) for foot in ("left_foot", "right_foot"))
     np.testing.assert_allclose(left[:3, 3] * (1, -1, 1), right[:3, 3], atol=1e-6)
     np.testing.assert_allclose(left[:3, :3], np.eye(3), atol=1e-8)
+
+
+def test_arms_rest_as_in_the_given_posture_that_stands_lowest():
+    robot = load_robot(
+        next(name for name in NAMES if any(limb.kind == "arm" for limb in load_robot(name).limbs))
+    )
+    seen = anatomy(robot).robot
+    arms = [i for limb in robot.limbs if limb.kind == "arm" for i in robot.path_to(limb.link)]
+    theirs, mine = (np.array(one.posture("home").q)[arms] for one in (robot, seen))
+    assert np.abs(theirs).max() > 0.1
+    np.testing.assert_allclose(mine, theirs, atol=1e-12)
