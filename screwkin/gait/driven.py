@@ -31,9 +31,7 @@ _AROUND = 0.3
 _LEAST = 0.01
 """Least room of a joint, which stands at its limit."""
 _GOOD = 0.5
-"""Share of the best volume from which a leg takes the joints nearer to the base."""
-_EQUAL = 1e-6
-"""Relative difference below which two choices are equally good; the joints nearer to the base win."""
+"""Share of the best volume from which the joints nearer to the base are taken."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,8 +157,8 @@ def _chosen(robot: Robot, limb: Limb, home: Array) -> tuple[int, ...]:
 def _best(robot: Robot, limb: Limb, own: Sequence[int], count: int, home: Array) -> tuple[int, ...]:
     """The ``count`` joints that move a tip best: largest volume of their columns, at home and around it.
 
-    A joint counts by its room to the nearer of its limits. Of a leg, joints near the base are preferred where
-    they are half as good as any: so toes rest, not ankles.
+    A joint counts by its room to the nearer of its limits. Joints near the base are preferred where they are
+    half as good as any: so toes rest, not ankles, and wrists before elbows.
     """
     if not count:
         return ()
@@ -183,5 +181,5 @@ def _best(robot: Robot, limb: Limb, own: Sequence[int], count: int, home: Array)
         for choice in total:
             scaled = [room[i] * columns[path.index(i)] for i in choice]
             total[choice] += abs(np.linalg.det(np.stack(scaled)))
-    best, share = max(total.values()), _GOOD if limb.kind == "leg" else 1 - _EQUAL
-    return next(choice for choice, volume in total.items() if volume >= share * best)
+    best = max(total.values())
+    return next(choice for choice, volume in total.items() if volume >= _GOOD * best)
