@@ -18,7 +18,7 @@ from screwkin.algebra.se3 import Pose, Vector, norm, unstack
 from screwkin.compiler.program import Program, Recorder
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.compiler.run import run
-from screwkin.ik.elimination import ANGLES, BRANCHES, Elimination, eliminations, vanishing
+from screwkin.ik.elimination import ANGLES, BRANCHES, Elimination, dialytic, eliminations, vanishing
 from screwkin.ik.polish import polished
 from screwkin.ik.starts import box, spread
 from screwkin.kinematics.serial_chain import SerialChain, cached, forward
@@ -31,7 +31,7 @@ EXACT_ENOUGH = 1e-9
 """Error of the given joint [rad] that costs no branches but those that nearly fall together."""
 USABLE = 1e-5
 """Error [rad] above which the determinant vanishes for all poses alike."""
-STIR = 1e-6
+STIR = 1e-5
 """How far axes are turned [rad] and moved, over the limb's length, where it does."""
 ROUGHLY = 1e-3
 """Error [rad] then, up to which Newton's method arrives."""
@@ -91,15 +91,26 @@ def _stirred(chain: SerialChain) -> SerialChain:
 
 
 def _errors(way: Elimination, tips: Pose, q: Array) -> Array:
-    """How far zeros of the determinant are from the given joint's angles (B,), by value and slope there."""
+    """Errors (B,) of branches at known positions.
+
+    That of the given joint by value and slope of the determinant, or that of the null vector and of what
+    follows from it: they belong to no single branch where several have that angle in common.
+    """
     D, x = way.displacement(tips), q[:, 5 - way.given if way.backwards else way.given]
     table = np.array([[np.broadcast_to(entry, x.shape) for entry in part] for part in way.table(D)])
     around = np.concatenate([equal_angles(ANGLES)[:, None] + 0 * x, [x, x + STEP, x - STEP]])
-    values = np.asarray(vanishing(list(_at(table.swapaxes(0, 1), around))))
+    matrices = _at(table.swapaxes(0, 1), around)
+    values = np.asarray(vanishing(list(matrices)))
     here, after, before = values[ANGLES:]
     scale = np.abs(values[:ANGLES]).max(axis=0) * ROUNDING
     slope = np.abs(after - before) / (2 * STEP)
-    return (np.abs(here) + scale) / np.where(slope > 0, slope, 1e-300)
+    own = np.zeros((len(x), 12, 12))
+    for i, row in enumerate(dialytic(list(matrices[:, ANGLES]))):
+        for k, entry in enumerate(row):
+            own[:, i, k] = entry
+    sizes = np.linalg.svd(own, compute_uv=False)
+    single = ROUNDING / np.maximum(np.minimum(sizes[:, -2] / sizes[:, 0], way.conditioning), 1e-300)
+    return np.maximum((np.abs(here) + scale) / np.where(slope > 0, slope, 1e-300), single)
 
 
 def _at(table: Array, x: Array) -> Array:

@@ -47,6 +47,8 @@ class Elimination:
         null: (6, 14) combinations of a line's numbers that the next two joints cannot change.
         angles: (4, 14) cosine and sine of these two joints from such numbers.
         offset: (14,) their numbers' constant part.
+        conditioning: least over largest singular value of what ``angles`` inverts; 0 where the line leaves
+            these two joints open.
     """
 
     chain: SerialChain
@@ -57,6 +59,7 @@ class Elimination:
     null: Array
     angles: Array
     offset: Array
+    conditioning: float
 
     def displacement(self, target: Pose) -> Pose:
         """How far the last link is displaced as the chain is walked, in the frame of the elimination."""
@@ -206,10 +209,11 @@ def _elimination(chain: SerialChain, walked: Sequence[Screw], backwards: bool, g
     for k in (given + 2, given + 1):
         lines = [part for line in lines for part in line.rotating(screws[k])]
     table = np.array([[float(x) for x in numbers(line)] for line in lines]).T
-    U, _, _ = np.linalg.svd(table[:, 1:])
+    U, sizes, _ = np.linalg.svd(table[:, 1:])
+    conditioning = float(sizes[-1] / sizes[0])
     # the first of the two joints runs faster: columns 1, 2 are its cosine and sine, columns 3, 6 the other's
     angles = np.linalg.pinv(table[:, 1:])[[0, 1, 2, 5]]
-    return Elimination(chain, backwards, given, frame, screws, U[:, 8:].T, angles, table[:, 0])
+    return Elimination(chain, backwards, given, frame, screws, U[:, 8:].T, angles, table[:, 0], conditioning)
 
 
 def _plain(screw: Screw, length: float) -> Screw:
