@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
 from screwkin.compliance.springs import joint_stiffness
 from screwkin.errors import InputError, UnknownNameError
@@ -128,7 +128,10 @@ def engines_for(engine: Engine, robot: Robot, compliance: SimulatedCompliance) -
 
 @dataclass(frozen=True)
 class Refinement:
-    """How much finer than its settings an engine works: parts of a step, and factor on its iterations."""
+    """How much finer than its settings an engine works: parts of a step, and factor on its iterations.
+
+    A direct solver has no iterations; its regularisation is divided by the factor instead.
+    """
 
     step: int = 1
     iterations: int = 1
@@ -182,4 +185,7 @@ P = TypeVar("P", Physics, MuJoCoPhysics)
 
 def _refined(physics: P, dt: float | None, finer: Refinement | None) -> P:
     by, step = finer or Refinement(), dt or physics.dt
-    return replace(physics, dt=step / by.step, iterations=physics.iterations * by.iterations)
+    changes: dict[str, Any] = {"dt": step / by.step, "iterations": physics.iterations * by.iterations}
+    if isinstance(physics, Physics):
+        changes["regularisation"] = physics.regularisation / by.iterations
+    return replace(physics, **changes)

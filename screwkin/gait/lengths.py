@@ -4,7 +4,7 @@
 as far as joints and limits allow, soles level. ``waist``: height of the steered frame above the hips (0
 unless the table has a ``[waist]``), so that ``waist_height = "0.93*leg + waist"`` fits every robot. ``hip``:
 distance between the hips. ``sole``: length of the shorter sole, along the foot's x axis. ``arm``: how far the
-hands hang below their shoulders at home (of the shorter arm; of a robot without hands, half a leg).
+hands hang below their shoulders at home (of the shorter arm; where none hangs, half a leg).
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def lengths_of(robot: Robot) -> Mapping[str, float]:
         "hip": float(norm(hips[0] - hips[1])),
         "sole": float(min(soles)),
         "waist": 0.0 - hip_height,
-        "arm": max(min(drops, default=0.5 * leg), 0.0),
+        "arm": min((drop for drop in drops if drop > 0), default=0.5 * leg),
     }
     return MappingProxyType({name: float(f"{value:.9g}") for name, value in values.items()})
 

@@ -1,25 +1,21 @@
 """The robot in PyBullet: rigid bodies, motors and contacts. The only file that imports pybullet.
 
-Settings that matter, all measured: a step of 1 ms with 200 solver iterations (``numSubSteps`` would divide
-the reported contact forces; on two small bipeds twice the iterations change the ZMP by .05 to .2 mm RMS, 50
-change it by .3 to 7 mm, and humanoids of 30 kg need about a thousand, which ``check_solver`` shows); no
-damping of any kind; the default joint motors released; inertia as the table gives it; friction anchors.
-Without these a robot on both feet creeps, for the two legs and the floor close a loop whose inner forces the
-solver never settles: 0.1 deg per second of standing. Anchored friction gives way beyond the friction
-coefficient all the same. Every call names its client: simulations can run side by side.
+Measured, beside ``Physics``: ``numSubSteps`` would divide the reported contact forces; there is no damping of
+any kind, and the default joint motors are released; inertia is as the table gives it; friction is anchored,
+or a robot on both feet creeps by 0.1 deg per second of standing. Every call names its client: simulations can
+run side by side.
 """
 
 from __future__ import annotations
 
-import contextlib
 import os
 import sys
 import tempfile
 import time
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -35,19 +31,29 @@ from screwkin.sim.camera import Camera
 from screwkin.sim.couplings import couple_in_pybullet
 from screwkin.sim.drive import UNLIMITED, RigidServos, Servos
 from screwkin.sim.motors import MotorServos
+from screwkin.sim.quiet import quiet
 from screwkin.sim.rotors import RelativeRotors, with_rotors
+
+Solver = Literal["direct", "iterative"]
 
 
 @dataclass(frozen=True)
 class Physics:
     """Settings of the simulation.
 
-    dt [s]; iterations of the constraint solver per step; friction between soles and floor; gravity [m/s^2];
-    sole_stiffness [N/m] and sole_damping [N s/m] of every point in which a leg's last link touches the floor,
-    None for rigid soles.
+    dt [s]; solver of motors and contacts: ``direct`` (Dantzig's pivoting, exact) or ``iterative`` (projected
+    Gauss-Seidel, with so many iterations; elastic soles need it, and it takes over where pivoting fails);
+    regularisation of the direct one, as redundant contacts share a force in many ways; friction between soles
+    and floor; gravity [m/s^2]; sole_stiffness [N/m] and sole_damping [N s/m] of every point in which a leg's
+    last link touches the floor, None for rigid soles.
+
+    Chosen by what finer ones change (``python -m benchmarks.convergence``): the direct solver is the faster
+    too; the iterative one errs the more, the heavier a robot is beside its feet.
     """
 
     dt: float = 1e-3
+    solver: Solver = "direct"
+    regularisation: float = 1e-8
     iterations: int = 200
     friction: float = 1.0
     gravity: float = 9.81
@@ -96,6 +102,8 @@ class PyBulletBackend:
         self.servo = self._servos.name
         self._physics = physics or Physics()
         _check_soles(self._physics)
+        if self._physics.sole_stiffness is not None:
+            self._physics = replace(self._physics, solver="iterative")
         self.dt = self._physics.dt
         self.settings: Mapping[str, Any] = asdict(self._physics)
         _check_feet(robot)
@@ -136,6 +144,13 @@ class PyBulletBackend:
             deterministicOverlappingPairs=1,
             **here,
         )
+        if physics.solver == "direct":
+            with quiet(1):
+                p.setPhysicsEngineParameter(
+                    constraintSolverType=p.CONSTRAINT_SOLVER_LCP_DANTZIG,
+                    globalCFM=physics.regularisation,
+                    **here,
+                )
         floor: int = p.createMultiBody(0.0, p.createCollisionShape(p.GEOM_PLANE, **here), **here)
         # The coefficients of the two bodies are multiplied: the floor takes 1, the robot the wanted friction.
         p.changeDynamics(floor, -1, lateralFriction=1.0, frictionAnchor=1, **here)
@@ -359,7 +374,7 @@ def _quat_xyzw(R: Array) -> list[float]:
 
 def _imported_pybullet() -> Any:
     try:
-        with _quiet():
+        with quiet(2):
             import pybullet
     except ImportError:
         raise MissingDependencyError(
@@ -367,20 +382,6 @@ def _imported_pybullet() -> Any:
             "install pybullet. For newer Pythons there are no wheels; MuJoCo simulates there."
         ) from None
     return pybullet
-
-
-@contextlib.contextmanager
-def _quiet() -> Iterator[None]:
-    """Hold back what pybullet's C code prints on stderr when it is loaded."""
-    sys.stderr.flush()
-    original = os.dup(2)
-    try:
-        with open(os.devnull, "w") as nowhere:
-            os.dup2(nowhere.fileno(), 2)
-        yield
-    finally:
-        os.dup2(original, 2)
-        os.close(original)
 
 
 def _connected(p: Any, gui: bool) -> int:

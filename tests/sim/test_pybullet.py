@@ -51,6 +51,33 @@ def stand(backend: PyBulletBackend, state: sk.State, steps: int) -> Observation:
     return backend.observe()
 
 
+def test_the_direct_solver_has_converged_whatever_the_iterations(robot: Robot, opened: Open) -> None:
+    """Its contact forces are those of a hundred times the regularisation; ten Gauss-Seidel sweeps are off."""
+    seen = {}
+    for name, physics in {
+        "usual": Physics(),
+        "few": Physics(iterations=5),
+        "softer": Physics(regularisation=1e-6),
+        "sweeps": Physics(iterations=10, solver="iterative"),
+    }.items():
+        backend = opened(robot, physics)
+        backend.reset(sk.home(robot))
+        seen[name] = stand(backend, sk.home(robot), 60)
+    force = {name: sum(np.array(c.force) for c in one.contacts) for name, one in seen.items()}
+    np.testing.assert_array_equal(seen["few"].torque, seen["usual"].torque)
+    np.testing.assert_allclose(force["softer"], force["usual"], atol=1e-3)
+    assert force["usual"][2] == pytest.approx(float(robot.mass) * 9.81, rel=1e-3)
+    assert force["sweeps"][2] != pytest.approx(float(robot.mass) * 9.81, rel=1e-3)
+
+
+def test_elastic_soles_are_solved_iteratively_and_nothing_is_printed(
+    robot: Robot, opened: Open, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert opened(robot).settings["solver"] == "direct"
+    assert opened(robot, Physics(sole_stiffness=2e4)).settings["solver"] == "iterative"
+    assert capfd.readouterr() == ("", "")
+
+
 def test_a_reset_puts_base_joints_and_feet_where_the_kinematics_say(robot: Robot, opened: Open) -> None:
     """The base frame is not PyBullet's, which has its origin in the torso's centre of mass."""
     rng = np.random.default_rng(3)

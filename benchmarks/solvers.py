@@ -1,0 +1,168 @@
+"""python -m benchmarks.solvers FILE... [--rows FILE] [-o FILE]: do finer settings change a verdict?
+
+Every public robot, as its file has it, stands, squats and walks in both engines on rigid servos, at usual
+settings, at half the step and at twice the iterations (``validate --check-solver``). Each motion's row is
+appended to the rows file at once, and motions that stand there are not tried again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import warnings
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cache
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import screwkin as sk
+from benchmarks.environments import ROOT
+from benchmarks.machine import pin_threads
+from screwkin.anatomy.humanoid import humanoid
+from screwkin.gait.balance import zmp
+
+MOTIONS = ("stand", "squat", "walk")
+DEPTH = 0.08
+"""How far a squat lowers the base, as a share of its height."""
+ALLOWED = 2.0
+"""How far the RMS of the contact ZMP against the plan may move [mm]."""
+Row = dict[str, Any]
+
+
+def motion_of(robot: sk.Robot, name: str) -> sk.Trajectory:
+    """A motion of that name: a stand of 1 s, a squat of 2 s, or a walk of two steps."""
+    if name == "walk":
+        return sk.walk(robot, sk.fitting_gait(robot), steps=2)
+    home = sk.home(robot)
+    time = np.linspace(0.0, 1.0 if name == "stand" else 2.0, 101)
+    depth = DEPTH * home.T_world_base[2, 3] if name == "squat" else 0.0
+    phase = np.pi * (1.0 - np.cos(np.pi * time / time[-1]))  # at rest at both ends
+    T = np.tile(home.T_world_base, (len(time), 1, 1))
+    T[:, 2, 3] -= depth * (1.0 - np.cos(phase)) / 2.0
+    feet = {limb.tip: sk.frame_pose(robot, home, limb.tip) for limb in robot.limbs if limb.kind == "leg"}
+    Ts_foot = {tip: np.tile(pose, (len(time), 1, 1)) for tip, pose in feet.items()}
+    guess = sk.State(T, np.tile(home.q, (len(time), 1)))
+    q = sk.solve_pose(robot, {"base": T, **Ts_foot}, guess).state.q if depth else guess.q
+
+    def rate(values: Any) -> Any:
+        return np.gradient(values, time, axis=0)
+
+    twist = np.zeros((len(time), 6))
+    twist[:, 3:] = rate(T[:, :3, 3])
+    tips = {limb.tip: sk.frame_pose(robot, sk.State(T, q), limb.tip) for limb in robot.limbs}
+    nothing = np.zeros(len(time))
+    motion = sk.Trajectory(
+        time=time,
+        joint_names=robot.joint_names,
+        q=q,
+        qd=rate(q),
+        qdd=rate(rate(q)),
+        T_world_base=T,
+        base_twist=twist,
+        base_acceleration=rate(twist),
+        T_world_tip=tips,
+        contact=np.ones((len(time), len(feet)), dtype=bool),
+        feet=tuple(feet),
+        com=np.zeros((len(time), 3)),
+        zmp=np.zeros((len(time), 2)),
+        margin=nothing,
+    )
+    balance = zmp(robot, motion)
+    return replace(motion, com=balance.com, zmp=balance.zmp, margin=balance.margin)
+
+
+@cache
+def robot_of(path: Path) -> sk.Robot:
+    """The robot of a file, with limbs, soles and home from its geometry."""
+    return humanoid(sk.load_robot(path))
+
+
+def row_of(path: Path, name: str) -> Row:
+    """What becomes of a motion, or the reason where there is no such motion."""
+    row: Row = {"file": str(path), "motion": name}
+    try:
+        robot = robot_of(path)
+        row |= {"name": robot.name, "mass": float(robot.mass), "joints": len(robot.joints)}
+        check = sk.validate(robot, motion_of(robot, name), check_solver=True)
+        return row | {"engines": check.solver, "reasons": list(check.reasons)}
+    except sk.ScrewkinError as error:
+        return row | {"reason": str(error).splitlines()[0]}
+
+
+def same(row: Row) -> bool:
+    """Whether every engine's verdict and ZMP outlast finer settings."""
+    return "engines" in row and all(
+        len(set(own["passed"].values())) == 1 and _moved(own) <= ALLOWED for own in row["engines"].values()
+    )
+
+
+def _moved(own: Row) -> float:
+    span = own["spread"]["zmp_rms_mm"]
+    return float("inf") if span is None else float(span[1] - span[0])
+
+
+def markdown(rows: Sequence[Row]) -> str:
+    """A line for every motion."""
+    simulated = [row for row in rows if "engines" in row]
+    lines = [
+        "# Verdicts at finer settings",
+        "",
+        "Public robots as their files have them, on rigid servos, at usual settings, half the step and twice",
+        "the iterations; `python -m benchmarks.solvers FILE...`. ZMP: least and largest RMS against the plan",
+        "over the three [mm].",
+        "",
+        f"{sum(map(same, simulated))} of {len(simulated)} motions: the same verdict, and the RMS within "
+        f"{ALLOWED:g} mm.",
+        "",
+        "| robot | kg | joints | motion | PyBullet | ZMP | MuJoCo | ZMP |",
+        "|---|---:|---:|---|---|---|---|---|",
+    ]
+    for row in rows:
+        name, mass = row.get("name", Path(row["file"]).stem), row.get("mass", 0.0)
+        head = f"| {name} | {mass:.1f} | {row.get('joints', '')} |"
+        if "engines" not in row:
+            lines.append(f"{head} {row['motion']} | {row['reason'].replace('|', '/')} | | | |")
+            continue
+        cells = []
+        for engine in ("pybullet", "mujoco"):
+            own = row["engines"].get(engine)
+            said = sorted({"passes" if p else "fails" for p in own["passed"].values()}) if own else []
+            span = own["spread"]["zmp_rms_mm"] if own else None
+            cells += ["/".join(said), "" if span is None else f"{span[0]:.2f} to {span[1]:.2f}"]
+        lines.append(f"{head} {row['motion']} | {' | '.join(cells)} |")
+    return "\n".join(lines) + "\n"
+
+
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.solvers", description=__doc__)
+    parser.add_argument("files", nargs="*", type=Path, help="URDF files")
+    parser.add_argument("--rows", type=Path, default=ROOT / "solvers.jsonl")
+    parser.add_argument("-o", "--output", type=Path, default=ROOT / "results" / "solvers.md")
+    asked = parser.parse_args(arguments)
+    pin_threads()
+    warnings.simplefilter("ignore")
+    asked.rows.parent.mkdir(parents=True, exist_ok=True)
+    text = asked.rows.read_text(encoding="utf-8") if asked.rows.exists() else ""
+    rows = [json.loads(line) for line in text.splitlines()]
+    done = {(row["file"], row["motion"]) for row in rows}
+    with asked.rows.open("a", encoding="utf-8") as file:
+        for name, path in product(MOTIONS, asked.files):
+            if (str(path), name) in done:
+                continue
+            rows.append(row := row_of(path, name))
+            file.write(json.dumps(row) + "\n")
+            file.flush()
+            print(path.name, name, row.get("engines") or row["reason"], flush=True)
+    rows.sort(key=lambda row: (row.get("name", row["file"]), MOTIONS.index(row["motion"])))
+    asked.output.parent.mkdir(parents=True, exist_ok=True)
+    asked.output.write_text(markdown(rows), encoding="utf-8")
+    print(markdown(rows))
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

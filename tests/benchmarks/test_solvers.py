@@ -1,0 +1,39 @@
+"""Motions of public robots at finer settings: what a row says, and the motions themselves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+import screwkin as sk
+from benchmarks.solvers import Row, markdown, motion_of, same
+
+
+def row(usual: bool, finer: bool, rms: list[float]) -> Row:
+    own = {"passed": {"usual": usual, "half the step": finer}, "spread": {"zmp_rms_mm": rms}}
+    return {
+        "file": "a.urdf",
+        "motion": "walk",
+        "name": "one",
+        "mass": 30.0,
+        "joints": 12,
+        "engines": {"mujoco": own},
+    }
+
+
+def test_a_verdict_outlasts_finer_settings_if_neither_it_nor_its_zmp_moves() -> None:
+    rows = [row(True, True, [0.1, 1.9]), row(True, True, [0.1, 2.9]), row(True, False, [0.1, 0.2])]
+    assert [same(one) for one in rows] == [True, False, False]
+    text = markdown([*rows, {"file": "b.urdf", "motion": "stand", "reason": "no legs"}])
+    assert "1 of 3 motions" in text
+    assert "| one | 30.0 | 12 | walk |  |  | passes | 0.10 to 1.90 |" in text
+    assert "| b | 0.0 |  | stand | no legs |" in text
+
+
+def test_a_squat_goes_down_and_up_with_the_feet_in_place() -> None:
+    robot = sk.load_robot("poppy12")
+    squat = motion_of(robot, "squat")
+    height = squat.T_world_base[:, 2, 3]
+    assert height.min() < 0.93 * height[0] < height[-1] * (1 + 1e-12)
+    for poses in squat.T_world_tip.values():
+        np.testing.assert_allclose(poses, np.broadcast_to(poses[0], poses.shape), atol=1e-9)
+    assert squat.margin.min() > 0
