@@ -111,7 +111,7 @@ def page_of(rows: Sequence[Row]) -> str:
         "on rigid servos. Anatomy: processor time of limbs, soles and home.",
         "Solved: the share of a leg's own random poses within limits that inverse kinematics finds again.",
         "",
-        f"{len(walked)} of {len(rows)} files walk in both engines.",
+        f"{len(walked)} of {len(rows)} files that were tried walk in both engines.",
         "",
         "| robot | joints | legs, arms | leg IK | solved | anatomy | gait | MuJoCo | PyBullet |",
         "|---|---|---|---|---|---|---|---|---|",

@@ -18,6 +18,7 @@ from screwkin.gait.files import load_gait
 from screwkin.gait.lengths import fitted
 from screwkin.gait.record import Gait
 from screwkin.gait.walk import planned_walk
+from screwkin.model.inertias import inertia_matrix
 from screwkin.model.robot import Robot
 from screwkin.trajectory import Trajectory
 
@@ -33,6 +34,7 @@ PERIODS = (3.5, 4.5, 6.0)
 USE = 0.9
 """Share of a joint's speed and torque that a gait may take."""
 _STEPS = 3
+_SPREAD = 2.0  # leg lengths: radii of gyration beyond it are in other units
 
 
 @dataclass(frozen=True)
@@ -122,9 +124,25 @@ def _refusal(robot: Robot, base: Gait, tried: Sequence[_Judged]) -> str:
     if tried:
         best = min(tried, key=lambda judged: len(judged.reasons))
         size = f"stride {best.gait.stride:.3g} m, Tc {best.gait.Tc:.3g} s"
-        return f"{robot.name}: no gait fits; with {size}: {'; '.join(best.reasons)}"
+        return f"{robot.name}: no gait fits; with {size}: {'; '.join(best.reasons)}{_spread(robot, base)}"
     stride, lift, _ = TRIES[-1]
     smallest = base.replace(stride=f"{stride:g}*leg", lift=f"{lift:g}*leg")
     reasons = _judged(robot, smallest).reasons
     why = "; ".join(reasons) or "joints would be faster than they can"
     return f"{robot.name}: no gait fits; with stride {smallest.stride:.3g} m: {why}"
+
+
+def _spread(robot: Robot, base: Gait) -> str:
+    """A word on inertias that no body of the robot's size has: no balance can be planned with them."""
+    radii = [
+        float(np.sqrt(max(np.linalg.eigvalsh(inertia_matrix(link.inertia))[-1], 0.0) / float(link.mass)))
+        for link in robot.links
+        if float(link.mass) > 0
+    ]
+    large = [radius for radius in radii if radius > _SPREAD * base.lengths["leg"]]
+    if not large:
+        return ""
+    return (
+        f". {len(large)} links have inertias of bodies of {max(large):.2g} m radius of gyration, where legs"
+        f" are {base.lengths['leg']:.2g} m: check their units (screwkin check)"
+    )
