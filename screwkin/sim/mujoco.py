@@ -22,6 +22,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array
 from screwkin.errors import InputError, needed_for
 from screwkin.kinematics.positions import tree_positions
+from screwkin.model.inertias import impossible
 from screwkin.model.robot import Joint, Robot
 from screwkin.model.state import State
 from screwkin.sim.backend import Command, Contact, Observation, moment_about_origin
@@ -91,7 +92,10 @@ class MuJoCoBackend:
         self.servo = self._servos.name
         self._mj = mj = mujoco_library()
         bodies, remarks = bodies_of(robot)
-        self.settings: Mapping[str, Any] = {**asdict(self._physics), "remarks": list(remarks)}
+        self.settings: Mapping[str, Any] = {
+            **asdict(self._physics),
+            "remarks": [*remarks, *(f"inertia balanced of {name}" for name in _unbalanced(robot))],
+        }
         spec = _world(mj, self._physics)
         _add_bodies(mj, spec, robot, bodies, self._servos.rotor_inertia)
         _add_closures(mj, spec, robot, bodies)
@@ -223,6 +227,7 @@ def _world(mj: Any, physics: MuJoCoPhysics) -> Any:
     """A floor, gravity and the solver's settings."""
     spec = mj.MjSpec()
     spec.compiler.degree = False
+    spec.compiler.balanceinertia = True  # of what no body can have; ``remarks`` name it
     spec.option.timestep = physics.dt
     spec.option.gravity = [0.0, 0.0, -physics.gravity]
     spec.option.integrator = mj.mjtIntegrator.mjINT_EULER
@@ -343,6 +348,10 @@ def _quat(mj: Any, T: Array) -> Array:
     quat = np.zeros(4)
     mj.mju_mat2Quat(quat, np.ascontiguousarray(T[:3, :3]).ravel())
     return quat
+
+
+def _unbalanced(robot: Robot) -> list[str]:
+    return [link.name for link in robot.links if impossible(link.inertia)]
 
 
 def _check_joints(robot: Robot) -> None:

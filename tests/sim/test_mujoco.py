@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import screwkin as sk
-from screwkin.errors import InputError, MissingDependencyError
+from screwkin.errors import InputError, MissingDependencyError, RobotRemark
 from screwkin.model.robot import Inertia, Joint, Robot
 from screwkin.sim.backend import Command, Observation
 from screwkin.sim.mujoco import MuJoCoBackend, MuJoCoPhysics
@@ -226,3 +226,15 @@ def test_a_window_without_a_display_is_refused(robot: Robot, monkeypatch: pytest
     monkeypatch.setattr(sys, "platform", "linux")
     with pytest.raises(InputError, match="DISPLAY is not set"):
         MuJoCoBackend(robot, gui=True)
+
+
+def test_an_inertia_that_no_body_has_is_balanced_and_said() -> None:
+    text = sk.load_robot("bioloid").text.replace(
+        "inertia = { box = [0.06, 0.10, 0.14] }",
+        "inertia = { xx = 1e-3, yy = 1e-3, zz = 3e-3, xy = 0, xz = 0, yz = 0 }",
+    )
+    with pytest.warns(RobotRemark):
+        robot = sk.robot_from_text(text)
+    backend = MuJoCoBackend(robot)
+    assert "inertia balanced of torso" in backend.settings["remarks"]
+    assert not any("balanced" in text for text in MuJoCoBackend(sk.load_robot("bioloid")).settings["remarks"])

@@ -55,9 +55,9 @@ def test_the_direct_solver_has_converged_whatever_the_iterations(robot: Robot, o
     """Its contact forces are those of a hundred times the regularisation; ten Gauss-Seidel sweeps are off."""
     seen = {}
     for name, physics in {
-        "usual": Physics(),
-        "few": Physics(iterations=5),
-        "softer": Physics(regularisation=1e-6),
+        "usual": Physics(solver="direct"),
+        "few": Physics(solver="direct", iterations=5),
+        "softer": Physics(solver="direct", regularisation=1e-6),
         "sweeps": Physics(iterations=10, solver="iterative"),
     }.items():
         backend = opened(robot, physics)
@@ -73,8 +73,8 @@ def test_the_direct_solver_has_converged_whatever_the_iterations(robot: Robot, o
 def test_elastic_soles_are_solved_iteratively_and_nothing_is_printed(
     robot: Robot, opened: Open, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    assert opened(robot).settings["solver"] == "direct"
-    assert opened(robot, Physics(sole_stiffness=2e4)).settings["solver"] == "iterative"
+    assert opened(robot, Physics(solver="direct")).settings["solver"] == "direct"
+    assert opened(robot, Physics(solver="direct", sole_stiffness=2e4)).settings["solver"] == "iterative"
     assert capfd.readouterr() == ("", "")
 
 
