@@ -123,8 +123,8 @@ def test_servos_that_would_have_to_be_faster_are_a_warning_and_no_reason(check: 
 
 
 def test_a_hurried_walk_falls_with_all_its_reasons(robot: Robot) -> None:
-    pytest.importorskip("pybullet")
-    check = validate(robot, planned(robot, steps=4, Tc=0.5))
+    pytest.importorskip("mujoco")
+    check = validate(robot, planned(robot, steps=4, Tc=0.5), engine="mujoco")
     assert not check.passed
     assert check.fell
     assert check.fell_at is not None
@@ -135,9 +135,9 @@ def test_a_hurried_walk_falls_with_all_its_reasons(robot: Robot) -> None:
 
 
 def test_weak_servos_do_not_carry_the_robot(robot: Robot, walk: Trajectory) -> None:
-    pytest.importorskip("pybullet")
+    pytest.importorskip("mujoco")
     weak = replace(robot, joints=tuple(replace(joint, effort=0.3) for joint in robot.joints))
-    check = validate(weak, walk)
+    check = validate(weak, walk, engine="mujoco")
     assert check.fell
     assert any("torque at the servo's limit for 50 ms" in reason for reason in check.reasons)
 

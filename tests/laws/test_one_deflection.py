@@ -95,9 +95,9 @@ def test_nor_on_whether_its_program_was_prepared():
 def test_nor_does_one_of_joints_that_are_so_soft_that_some_collapse(name, k):
     robot = sk.load_robot(name)
     home = sk.home(robot)
-    q = home.q + np.random.default_rng(0).uniform(-0.5, 0.5, (150, len(home.q)))
+    q = home.q + np.random.default_rng(0).uniform(-0.5, 0.5, (60, len(home.q)))
     whole = batch_matters_not(robot, sk.State(home.T_world_base, q), "left_foot", k, "nonlinear")
-    assert 0 < (whole.converged & whole.stable).sum() < 150
+    assert 0 < (whole.converged & whole.stable).sum() < 60
 
 
 @given(seed=st.integers(0, 50), k=st.sampled_from([40.0, 200.0, 600.0]), data=st.data())
