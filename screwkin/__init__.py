@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from screwkin.export.bind import bind, prepare
     from screwkin.gait.balance import Balance, zmp
     from screwkin.gait.files import load_gait
+    from screwkin.gait.fitting import fitting_gait
     from screwkin.gait.record import Gait
     from screwkin.gait.walk import walk
     from screwkin.ik.limb import limb_ik
@@ -43,6 +44,7 @@ _HOMES = {
     "export.bind": "bind prepare",
     "gait.balance": "Balance zmp",
     "gait.files": "load_gait",
+    "gait.fitting": "fitting_gait",
     "gait.record": "Gait",
     "gait.walk": "walk",
     "ik.limb": "limb_ik",
@@ -77,6 +79,7 @@ __all__ = [
     "close_loops",
     "closed_mechanism",
     "com_jacobian",
+    "fitting_gait",
     "frame_pose",
     "ground_wrench",
     "home",

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import cos
 
 AXES = {"yaw": (0, 0, 1), "roll": (1, 0, 0), "pitch": (0, 1, 0)}
-HIP, KNEE, ANKLE, SOLE = 0.0, -0.25, -0.5, -0.55
+HIP, KNEE, ANKLE, TOE, SOLE = 0.0, -0.25, -0.5, -0.53, -0.55
 SHOULDER, ELBOW, WRIST, HAND = 0.3, 0.1, -0.08, -0.14
 BEND = 0.5
 """Hip pitch at home [rad], forwards; the knee bends twice as far."""
@@ -21,7 +21,15 @@ SEVEN = (
     "wrist_pitch",
     "wrist_roll",
 )
-HEIGHTS = {"hip": HIP, "knee": KNEE, "ankle": ANKLE, "shoulder": SHOULDER, "elbow": ELBOW, "wrist": WRIST}
+HEIGHTS = {
+    "hip": HIP,
+    "knee": KNEE,
+    "ankle": ANKLE,
+    "toe": TOE,
+    "shoulder": SHOULDER,
+    "elbow": ELBOW,
+    "wrist": WRIST,
+}
 
 
 def humanoid(

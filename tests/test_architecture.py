@@ -34,13 +34,13 @@ FLOORS: dict[str, int] = {
     "cli": 10, "__main__": 10, "": 10,
 }  # fmt: skip
 DRIVERS = {
-    "pybullet": "screwkin.sim.pybullet",
-    "pybullet_data": "screwkin.sim.pybullet",
-    "mujoco": "screwkin.sim.mujoco",
-    "trimesh": "screwkin.model.meshes",
-    "collada": "screwkin.model.meshes",
-    "serial": "screwkin.servo.bus",
-    "dynamixel_sdk": "screwkin.servo.bus",
+    "pybullet": ("screwkin.sim.pybullet",),
+    "pybullet_data": ("screwkin.sim.pybullet",),
+    "mujoco": ("screwkin.sim.mujoco", "screwkin.model.mjcf_in"),
+    "trimesh": ("screwkin.model.meshes",),
+    "collada": ("screwkin.model.meshes",),
+    "serial": ("screwkin.servo.bus",),
+    "dynamixel_sdk": ("screwkin.servo.bus",),
 }
 LAZY = (*DRIVERS, "sympy")
 SLOW_TO_START = ("jax", "scipy", "matplotlib", "sympy", "pybullet", "serial", "dynamixel_sdk")
@@ -180,11 +180,11 @@ def mutual(sources: list[Module]) -> list[str]:
 
 def misplaced_drivers(sources: list[Module]) -> list[str]:
     return [
-        f"{m.name}:{used.line}: only {home} imports {name}"
+        f"{m.name}:{used.line}: only {' and '.join(home)} imports {name}"
         for m in sources
         for used in m.imports
         for name, home in DRIVERS.items()
-        if used.target.split(".")[0] == name and m.name != home
+        if used.target.split(".")[0] == name and m.name not in home
     ]
 
 

@@ -27,13 +27,16 @@ def chains_of(skeleton: Skeleton, symmetry: Symmetry, pair: Pair) -> tuple[tuple
     """Joints of both arms: down to where one is no single chain any more, or has no partner.
 
     A branch that carries no further joint (a gear, one finger of a gripper) is no continuation; where
-    several carry some, or a joint follows another one, the hand begins.
+    several carry some, or joints follow one another, the hand begins.
     """
     first, own = [pair.one], len(skeleton.robot.joints)
+    leaders = {joint.leader for joint in skeleton.robot.coupled}
     while True:
         further = skeleton.next(first[-1])
         longer = [k for k in further if depth(skeleton, k) > 1] if len(further) > 1 else list(further)
         if len(longer) != 1 or not symmetry.pairs[longer[0]] or longer[0] >= own:
+            break
+        if skeleton.robot.tree[longer[0]].name in leaders:
             break
         first.append(longer[0])
     second = tuple(int(symmetry.partner[i]) for i in first)

@@ -10,6 +10,7 @@ from screwkin.anatomy.facets import area_of
 from screwkin.anatomy.footing import Footing
 from screwkin.anatomy.forward import Forward
 from screwkin.anatomy.limbs import SPLAYED, TOPPLED, Pair, Stance
+from screwkin.anatomy.outline import Outline
 from screwkin.anatomy.postures import PARTS, Home
 from screwkin.anatomy.record import Finding
 from screwkin.anatomy.skeleton import Skeleton
@@ -21,6 +22,10 @@ SURE = {"flat": 0.95, "edge": 0.6, "point": 0.5}
 """How sure a sole is by its kind: meshes of flat feet are flat, points and edges may be what a mesh lacks."""
 LOST_PER_DEGREE = 0.01
 """What a degree of tilt takes from that."""
+GUESSED = 0.3
+"""What is left of that where the inertia of a link stands for its surface."""
+PARTLY = 0.5
+"""What is left of that where some of a link's shapes cannot be read."""
 COORDINATES = ("rx", "ry", "rz", "px", "py", "pz")
 
 
@@ -68,11 +73,12 @@ def of_arm(robot: Robot, side: str, joints: Sequence[int]) -> Finding:
     return Finding(f"{side}_arm", f"{len(names)} joints, {_listed(names)}, to {end}", 0.9, why)
 
 
-def of_sole(side: str, foot: Foot, at: Footing, kinds: str) -> Finding:
+def of_sole(side: str, at: Footing, parts: Sequence[str], outline: Outline) -> Finding:
     """A sole, by its kind, its tilt in the zero pose, and by whether left and right agree."""
     size = np.ptp(at.corners, axis=0)
     answer = f"{at.kind}, {1e3 * size[0]:.0f} x {1e3 * size[1]:.0f} mm, {len(at.corners)} corners"
-    why = f"the largest facet of the hull of {kinds} that looks down has {1e4 * area_of(at.corners):.1f} cm^2"
+    area = 1e4 * area_of(at.corners)
+    why = f"the largest facet of the hull of {_listed(parts)} that looks down has {area:.1f} cm^2"
     sure = SURE[at.kind] - LOST_PER_DEGREE * at.tilt
     if at.tilt > 0:
         took = "taken as level" if at.level else "level at home"
@@ -80,6 +86,12 @@ def of_sole(side: str, foot: Foot, at: Footing, kinds: str) -> Finding:
     if at.differs > 1e-3:
         why += f"; left and right differ by {100 * at.differs:.0f} %"
         sure -= 0.3 * at.differs
+    if guessed := [name for name in parts if name in outline.guessed]:
+        why += f"; no surface of {_listed(guessed)} can be read: its inertia stands for it"
+        sure *= GUESSED
+    elif unread := [name for name in parts if name in outline.unread]:
+        why += f"; meshes of {_listed(unread)} cannot be read, only its other shapes"
+        sure *= PARTLY
     if at.kind != "flat":
         why += f"; it is no area to stand on but an {at.kind}" if at.kind == "edge" else "; it is a point"
     return Finding(f"{side}_leg", answer, _rounded(max(sure, 0.1)), why)

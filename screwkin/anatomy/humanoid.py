@@ -27,7 +27,7 @@ from screwkin.anatomy.postures import Legs, home_of
 from screwkin.anatomy.record import Anatomy
 from screwkin.anatomy.skeleton import Skeleton
 from screwkin.anatomy.soles import Foot, band_of, feet_of
-from screwkin.anatomy.symmetry import Symmetry, symmetry_of
+from screwkin.anatomy.symmetry import TILT, Symmetry, symmetry_of
 from screwkin.anatomy.turned import seen_from
 from screwkin.anatomy.written import commented_table
 from screwkin.errors import expect
@@ -36,6 +36,8 @@ from screwkin.model.robot import Box, Limb, Link, Robot, Sole
 from screwkin.model.values import COUPLINGS
 
 SIDES = ("left", "right")
+ASIDE = 10.0
+"""Tilt in the zero pose [deg] beyond which an edge or a point is nothing to stand on."""
 
 
 def humanoid(robot: Robot) -> Robot:
@@ -97,6 +99,7 @@ def _built(
     whole = robot if (np.eye(3) == R).all() else seen_from(robot, Pose(turn, ZERO))
     own = [foot.turned(R) for foot in (feet if sense > 0 else feet[::-1])]
     footing = footings(own[0], own[1], offset, stance.length, band_of(stance))
+    _refuse_no_soles(robot, own, footing, stance)
     limbs = [_leg(whole, side, foot, at) for side, foot, at in zip(SIDES, own, footing, strict=True)]
     soles = [Sole(f"{side}_leg", _points(at.places)) for side, at in zip(SIDES, footing, strict=True)]
     arms, rest = arms_of(skeleton, symmetry, stance)
@@ -121,20 +124,31 @@ def _built(
     legs = _legs(whole, own, footing, skeleton, symmetry, R)
     home = home_of(legs, _resting(whole))
     whole = replace(whole, postures=(home.posture,))
-    kinds = [", ".join((foot.link, *foot.toes)) for foot in own]
-    both = list(zip(SIDES, own, footing, kinds, strict=True))[::-1]
+    parts = [(foot.link, *foot.toes) for foot in own]
+    both = list(zip(SIDES, own, footing, parts, strict=True))[::-1]
     sided = list(zip(SIDES, chains if sense > 0 else chains[::-1], strict=True))[::-1]
     symmetric, faces = findings.of_symmetry(skeleton, symmetry), findings.of_forward(forward)
     limb_findings = (
         *(findings.of_leg(whole, side, foot, stance) for side, foot, _, _ in both),
         *(findings.of_arm(whole, side, chain) for side, chain in sided if chain),
     )
-    sole_findings = tuple(findings.of_sole(side, foot, at, kind) for side, foot, at, kind in both)
+    sole_findings = tuple(findings.of_sole(side, at, part, outline) for side, _, at, part in both)
     waist = findings.of_waist(whole, own, chains)
     at_home = findings.of_home(home, stance.length)
-    remarks = findings.of_rest(whole, rest, list(outline.remarks))
+    remarks = findings.of_rest(whole, rest, outline.remarks)
     found = Anatomy(whole, turn, symmetric, faces, limb_findings, sole_findings, waist, at_home, remarks)
     return replace(found, robot=Robot.from_text(commented_table(found), robot.path))
+
+
+def _refuse_no_soles(robot: Robot, feet: Sequence[Foot], footing: Sequence[Footing], stance: Stance) -> None:
+    """Refuse edges and points that look aside, or not along z: those of hands and grippers."""
+    for foot, at in zip(feet, footing, strict=True):
+        if at.kind != "flat" and (at.tilt > ASIDE or stance.up[2] < 1 - TILT):
+            length, width = 1e3 * np.ptp(at.corners, axis=0)
+            raise AnatomyError(
+                f"{robot.name} has no feet: the largest facet below {foot.link} is of {length:.0f} x"
+                f" {width:.0f} mm, {at.tilt:.0f} degrees off the floor"
+            )
 
 
 def _leg(robot: Robot, side: str, foot: Foot, at: Footing) -> Limb:
@@ -153,8 +167,9 @@ def _arm(robot: Robot, side: str, chain: tuple[int, ...]) -> Limb:
 
 
 def _free_name(robot: Robot, name: str) -> str:
-    """A name for a tip that no link has."""
-    return name if name not in robot.link_names else _free_name(robot, f"{name}_tip")
+    """A name for a tip that no link or frame has."""
+    taken = {*robot.link_names, *(frame.name for frame in robot.frames)}
+    return name if name not in taken else _free_name(robot, f"{name}_tip")
 
 
 def _points(places: Array) -> tuple[Vector, ...]:

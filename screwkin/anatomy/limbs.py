@@ -191,10 +191,11 @@ def _low(skeleton: Skeleton, surface: Surface, pair: Pair, up: Array) -> float:
     return float((surface(_links(skeleton, pair)) @ up).min(initial=np.inf))
 
 
-def _upward(skeleton: Skeleton, symmetry: Symmetry) -> Array:
-    """Directions (4, 3) within the plane of symmetry along or across which most axes run; z, if it can be.
+def _upward(skeleton: Skeleton, symmetry: Symmetry) -> list[Array]:
+    """Directions (3,) within the plane of symmetry in which a machine may stand.
 
     Machines are built at right angles: roll and yaw axes run forward and up in the pose that is called zero.
+    So these are the base axes, where two lie in the plane, and those along or across which most axes run.
     """
     normal = symmetry.normal
     base = [e for e in np.eye(3)[[2, 0, 1]] if abs(e @ normal) < TILT]
@@ -206,11 +207,13 @@ def _upward(skeleton: Skeleton, symmetry: Symmetry) -> Array:
     def along(e: Array) -> int:
         return sum(min(abs(s @ e), np.linalg.norm(np.cross(s, e))) < TILT for s in axes)
 
-    e = max([*base, *axes], key=along)
-    e = e - normal * (e @ normal)
-    e = e / np.linalg.norm(e)
-    across = np.cross(normal, e)
-    return np.array([e, -e, across, -across])
+    chosen: list[Array] = []
+    for one in [*base[:1], max([*base, *axes], key=along)]:
+        e = one - normal * (one @ normal)
+        e = e / np.linalg.norm(e)
+        if all(min(abs(e @ other), np.linalg.norm(np.cross(e, other))) > TILT for other in chosen):
+            chosen += [e, -e, np.cross(normal, e), -np.cross(normal, e)]
+    return chosen
 
 
 def _refuse_other_floors(skeleton: Skeleton, surface: Surface, stance: Stance) -> None:

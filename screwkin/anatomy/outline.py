@@ -3,64 +3,90 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import fields
+from functools import cached_property
 
 import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array
+from screwkin.errors import InputError, MissingDependencyError
 from screwkin.model.inertias import inertia_matrix
-from screwkin.model.records import Link, RobotRecord
+from screwkin.model.records import Link, Shape, ShapeRole
 from screwkin.model.robot import Robot
-from screwkin.model.shapes import link_points
+from screwkin.model.shapes import box_points, honours_up, shape_points
 
 WHOLE = 0.5
 """Greatest diagonal of a solid box that may stand for a link, by the robot's size."""
 
 
 class Outline:
-    """Points of a robot's links in base axes, zero pose; ``remarks`` says which meshes could not be read.
+    """Points of a robot's links in base axes, zero pose.
 
-    A link's collision shapes and boxes count; where it has none, its pictures; without these, no points.
+    A link's collision shapes and boxes count; where it has none, its pictures; where these cannot be read,
+    the solid box with its inertia (``guessed``). ``unread`` lists for every such link what went wrong.
     """
 
     def __init__(self, robot: Robot, size: float) -> None:
         self.robot, self.size = robot, size
-        self.remarks: dict[str, None] = {}
+        self.unread: dict[str, list[str]] = {}
+        self.guessed = list[str]()
         self._points: dict[str, Array] = {}
 
     def of(self, links: Iterable[str]) -> Array:
         """Points (N, 3) [m] of links, none of what has no surface."""
         names = list(links)
-        new = [name for name in names if name not in self._points]
-        if new:
-            self._load(new)
-        clouds = [self._points[name] for name in names]
-        return np.concatenate([*clouds, np.zeros((0, 3))])
+        for name in names:
+            if name not in self._points:
+                self._points[name] = self._load(name)
+        return np.concatenate([*(self._points[name] for name in names), np.zeros((0, 3))])
 
-    def _load(self, names: list[str]) -> None:
-        def part(chosen: list[str]) -> RobotRecord:
-            values = {f.name: getattr(self.robot, f.name) for f in fields(RobotRecord)}
-            return RobotRecord(**values | {"links": tuple(self.robot.link(name) for name in chosen)})
+    def _load(self, name: str) -> Array:
+        """Points of one link."""
+        link = self.robot.link(name)
+        touched = self._clouds(link, "collision") + [box_points(box) for box in link.boxes]
+        clouds = touched or self._clouds(link, "visual")
+        if clouds:
+            return np.concatenate(clouds)
+        if link.mass and (link.shapes or self._bare):
+            solid = _solid(link)
+            if np.linalg.norm(solid[-1] - solid[0]) <= WHOLE * self.size:  # else no moments of this robot
+                self.guessed.append(name)
+                return solid
+        return np.zeros((0, 3))
 
-        bare_robot = not any(link.shapes or link.boxes for link in self.robot.links)
-        touched = link_points(part(names), "collision")
-        bare = [name for name in names if name not in touched.points]
-        seen = link_points(part(bare), "visual")
-        for name in bare:
-            link = self.robot.link(name)
-            if name not in seen.points and (link.shapes or bare_robot) and link.mass:
-                solid = _solid(link)
-                if np.linalg.norm(solid[-1] - solid[0]) > WHOLE * self.size:
-                    continue  # moments that no link of this robot can have
-                self._points[name] = solid
-                self.remarks[f"{name}: no surface can be read; a solid box of its inertia stands for it"] = (
-                    None
-                )
-        names = [name for name in names if name not in self._points]
-        empty = {name: np.zeros((0, 3)) for name in names}
-        self._points |= {**empty, **seen.points, **touched.points}
-        self.remarks |= dict.fromkeys((*touched.remarks, *seen.remarks))
+    def _clouds(self, link: Link, role: ShapeRole) -> list[Array]:
+        clouds = []
+        for shape in link.shapes:
+            if shape.role == role:
+                try:
+                    clouds.append(shape_points(shape, self._upright(shape)))
+                except (InputError, MissingDependencyError) as wrong:
+                    self.unread.setdefault(link.name, []).append(str(wrong))
+        return clouds
+
+    def _upright(self, shape: Shape) -> bool:
+        """Whether files that say which axis is up are believed: asked of all meshes, once one says so."""
+        return not shape.file.lower().endswith(".dae") or self._honours
+
+    @cached_property
+    def _honours(self) -> bool:
+        return honours_up(self.robot)
+
+    @cached_property
+    def _bare(self) -> bool:
+        """Whether no link has any shape."""
+        return not any(link.shapes or link.boxes for link in self.robot.links)
+
+    @property
+    def remarks(self) -> list[str]:
+        """What a user should know of the meshes."""
+        texts = []
+        if self.unread:
+            first = next(iter(self.unread.values()))[0]
+            texts.append(f"meshes of {', '.join(self.unread)} cannot be read; {first}")
+        if self.guessed:
+            texts.append(f"boxes of their inertia stand for {', '.join(self.guessed)}")
+        return texts
 
     def roughly(self, links: Iterable[str]) -> Array:
         """One point for every link (N, 3) [m], whatever its surface: its CoM, or its frame if massless."""

@@ -7,7 +7,7 @@ begins from its image.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,7 +19,7 @@ from screwkin.algebra.se3 import IDENTITY, as_array
 from screwkin.errors import NoSolutionError
 from screwkin.kinematics.body import center_of_mass
 from screwkin.kinematics.serial_chain import SerialChain, residual
-from screwkin.model.robot import Posture, Robot
+from screwkin.model.robot import Joint, Posture, Robot
 from screwkin.model.state import State
 
 BEND = 0.94
@@ -73,6 +73,7 @@ class Legs:
         ankle: height of the ankle above the sole [m].
         points: whether the feet are points, so that they have no tilt.
         shared: number of joints from the base to where the legs part; they rest.
+        held: further joints that rest, counted as in ``Robot.tree``.
     """
 
     robot: Robot
@@ -82,6 +83,7 @@ class Legs:
     ankle: float
     points: bool
     shared: int
+    held: frozenset[int] = frozenset()
 
 
 def home_of(legs: Legs, rest: Array) -> Home:
@@ -94,6 +96,8 @@ def home_of(legs: Legs, rest: Array) -> Home:
     Raises:
         NoSolutionError: within their limits, the legs cannot stand with level soles at any height.
     """
+    own = len(rest)
+    legs, rest = _uncoupled(legs, rest)
     robot, side = legs.robot, _Side.of(legs, "left_leg", rest)
     start = side.chain.tip.p
     length = legs.hip - float(start.z) - legs.ankle
@@ -122,8 +126,28 @@ def home_of(legs: Legs, rest: Array) -> Home:
             break
         place[0] = wanted
     whole = _both(legs, rest, q, place, rows)
-    posture = Posture("home", bent - legs.hip, tuple(map(float, whole)))
+    posture = Posture("home", bent - legs.hip, tuple(map(float, whole[:own])))
     return Home(posture, rows, side.knee(q) >= 0, off, height / bent)
+
+
+def _uncoupled(legs: Legs, rest: Array) -> tuple[Legs, Array]:
+    """The legs of a robot whose coupled joints are free, but rest with their leaders; and all positions.
+
+    Joints that follow one another may tie one leg to the other: at rest each leg has its own way to stand.
+    """
+    robot, names = legs.robot, legs.robot.joint_names
+    if not robot.coupled:
+        return legs, rest
+    leaders = [names.index(joint.leader) for joint in robot.coupled]
+    follow = [
+        joint.ratio * rest[leader] + joint.offset
+        for joint, leader in zip(robot.coupled, leaders, strict=True)
+    ]
+    kept = [f.name for f in fields(Joint)]
+    freed = tuple(Joint(**{name: getattr(joint, name) for name in kept}) for joint in robot.coupled)
+    free = replace(robot, joints=(*robot.joints, *freed), coupled=(), postures=(), text="")
+    held = frozenset((*leaders, *range(len(names), len(names) + len(freed))))
+    return replace(legs, robot=free, held=held), np.concatenate([rest, follow])
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,7 +177,8 @@ class _Side:
         low, high = (np.clip(end, -np.pi, np.pi) for end in (chain.lower, chain.upper))
         room = ROOM * (high - low)
         low, high, at_rest = low + room, high - room, rest[own]
-        low[: legs.shared] = high[: legs.shared] = at_rest[: legs.shared]
+        resting = [k for k, i in enumerate(own) if k < legs.shared or i in legs.held]
+        low[resting] = high[resting] = at_rest[resting]
         return cls(chain, own, low, high, at_rest)
 
     def solved(self, places: Array, rows: tuple[int, ...], starts: Array) -> _Solved | None:

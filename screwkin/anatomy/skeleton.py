@@ -74,11 +74,18 @@ class Skeleton:
 
     def place(self, links: tuple[str, ...]) -> Array:
         """Common CoM of links (3,) [m]; of massless ones the middle of their frames."""
-        chosen = [self.robot.link(name) for name in links]
-        mass = np.array([float(link.mass) for link in chosen])
+        rows = np.array([self._bodies[name] for name in links])
+        mass = rows[:, 0]
         if mass.sum() > 0:
-            return np.asarray(mass @ np.array([as_array(link.com) for link in chosen], float) / mass.sum())
-        return np.asarray(np.mean([as_array(link.frame.p) for link in chosen], axis=0, dtype=float))
+            return np.asarray(mass @ rows[:, 1:4] / mass.sum())
+        return np.asarray(rows[:, 4:].mean(axis=0))
+
+    @cached_property
+    def _bodies(self) -> dict[str, tuple[float, ...]]:
+        """For every link: mass, CoM, origin of its frame."""
+        return {
+            link.name: tuple(map(float, (link.mass, *link.com, *link.frame.p))) for link in self.robot.links
+        }
 
     @cached_property
     def size(self) -> float:

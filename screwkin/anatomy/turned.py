@@ -26,7 +26,7 @@ def seen_from(robot: R, T_new_old: Pose) -> R:
         robot: of numbers.
         T_new_old: takes base coordinates to those of the new base frame.
     """
-    tables = ("links", "joints", "coupled", "closures", "limbs", "soles", "waist")
+    tables = ("links", "joints", "coupled", "closures", "limbs", "soles", "frames", "waist")
     present = {f.name for f in fields(robot)} & set(tables)
     moved: dict[str, Any] = {name: _carried(getattr(robot, name), T_new_old) for name in present}
     if not _is_right_angled(T_new_old):

@@ -20,6 +20,7 @@ VERBS = {
     "robots": "List the bundled robots and mechanisms.",
     "gaits": "List the bundled gaits.",
     "info": "Mass, closed mechanism and conditioning of a robot.",
+    "check": "Audit a robot: what is doubtful in it, and what simulators would change.",
     "table": "The screw table of a robot; also Markdown, LaTeX and symbolic.",
     "new": "The table of a humanoid from its URDF: limbs, soles and home, from geometry alone.",
     "convert": "Convert a robot between screw tables, URDF and DH tables.",

@@ -10,27 +10,33 @@ import typer
 
 from screwkin.analysis.chains import derived_tables
 from screwkin.cli.options import AsJson
-from screwkin.cli.output import print_json, remark
-from screwkin.errors import InputError, one_of
+from screwkin.cli.output import print_json, remark, shortened
+from screwkin.errors import InputError, TableError, one_of
 from screwkin.files import atomic_write
 from screwkin.model.coupled import coupling_text
 from screwkin.model.dh import CONVENTIONS, Convention
 from screwkin.model.dh_csv import dh_text, load_dh
 from screwkin.model.dh_robot import robot_from_dh
+from screwkin.model.mjcf_in import is_mjcf, parse_mjcf
 from screwkin.model.robot import Robot
+from screwkin.model.srdf import srdf_from_robot
 from screwkin.model.table import load_robot
+from screwkin.model.toml import read_text
 from screwkin.model.toml_out import robot_toml
 from screwkin.model.urdf import urdf_from_robot
 from screwkin.model.urdf_in import load_urdf
 from screwkin.model.urdf_joints import MIMICS, Mimic
 
-_FRAMES = "URDF holds no limbs, postures and servos; tips and soles are frames fixed to their links"
+_SRDF = "limbs, soles and postures stand in the SRDF file beside; URDF and SRDF hold no servos and parameters"
 FORMATS = (".toml", ".urdf", ".csv")
 
 
 def convert(
     source: Annotated[
-        str, typer.Argument(metavar="IN", help="A bundled robot's name, or a .toml, .urdf or DH .csv file.")
+        str,
+        typer.Argument(
+            metavar="IN", help="A bundled robot's name, or a .toml, .urdf, MJCF .xml or DH .csv file."
+        ),
     ],
     target: Annotated[Path, typer.Argument(metavar="OUT", help="The .toml, .urdf or DH .csv file to write.")],
     convention: Annotated[
@@ -62,6 +68,9 @@ def convert(
     text, lost = _written(robot, target, chosen)
     with atomic_write(target) as file:
         file.write(text)
+    if target.suffix.lower() == ".urdf" and (robot.limbs or robot.postures):
+        with atomic_write(target.with_suffix(".srdf")) as file:
+            file.write(srdf_from_robot(robot))
     remarks += lost
     if as_json:
         data = {"robot": robot.name, "file": str(target), "joints": robot.joint_names, "remarks": remarks}
@@ -69,15 +78,16 @@ def convert(
     else:
         print(f"{target}: {robot.name}, {len(robot.links)} links, {len(robot.joints)} joints")
         for text in remarks:
-            remark(f"remark: {text}")
+            remark(shortened(f"remark: {text}"))
     return 0
 
 
 def _read(source: str, repair: bool, mimic: Mimic) -> tuple[Robot, list[str]]:
     """The robot of a name or file, and remarks on what its format leaves open."""
     suffix = Path(source).suffix.lower()
-    if suffix == ".urdf":
-        read = load_urdf(source, repair, mimic)
+    if suffix in (".urdf", ".xml"):
+        text = read_text(Path(source), TableError)
+        read = parse_mjcf(text, source, repair) if is_mjcf(text) else load_urdf(source, repair, mimic)
         return read.robot, list(read.remarks)
     if repair or mimic == "free":
         raise InputError(f"--repair and --mimic are for a URDF that is read, and {source} is none; edit it")
@@ -97,7 +107,7 @@ def _written(robot: Robot, target: Path, convention: Convention) -> tuple[str, l
     }
     lost = {
         ".toml": [],
-        ".urdf": [_FRAMES] if robot.limbs else [],
+        ".urdf": [_SRDF] if robot.limbs or robot.postures else [],
         ".csv": ["DH tables hold the chains' geometry only: no masses, limits, soles and closures"],
     }
     if robot.coupled and suffix == ".csv":

@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from screwkin.analysis.facts import Facts, facts_of
+from screwkin.analysis.ik_class import IkClass, ik_classes
 from screwkin.cli.options import AsJson, RobotName, point_of
 from screwkin.cli.output import aligned, print_json
 from screwkin.compiler.run import large_batches
@@ -35,7 +36,10 @@ def info(
     )
     if as_json:
         touching = _touching(facts.robot)
-        print_json(facts.to_dict() | {"large_batches": large_batches(), "touching_at_home": touching})
+        solved = [limb.to_dict() for limb in ik_classes(facts.robot)]
+        print_json(
+            facts.to_dict() | {"ik": solved, "large_batches": large_batches(), "touching_at_home": touching}
+        )
     else:
         print(_text(facts))
     return 0
@@ -94,9 +98,19 @@ def _text(facts: Facts) -> str:
         "closed mechanism",
         aligned(closed, "  "),
     ]
+    solved = [_solved(limb) for limb in ik_classes(robot)]
+    if solved:
+        parts += ["inverse kinematics", aligned(solved, "  ")]
     if limbs:
         parts += ["smallest singular value, dimensionless by the robot's size", aligned(limbs, "  ")]
     return "\n".join(parts)
+
+
+def _solved(limb: IkClass) -> tuple[str, ...]:
+    """How a limb is solved, how many branches it has, and how sure it is."""
+    branches = "one branch" if limb.branches == 1 else f"at most {limb.branches} branches"
+    share = f"{limb.solved:.1%} of {limb.poses} {limb.target}s within the limits solved"
+    return (limb.limb, limb.family, *((branches, share) if limb.poses else ()))
 
 
 def _listed(names: tuple[str, ...]) -> str:

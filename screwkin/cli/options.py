@@ -11,7 +11,10 @@ import typer
 from screwkin.errors import InputError
 
 RobotName = Annotated[
-    str, typer.Argument(metavar="ROBOT", help="A bundled robot's name, or the path of a table.")
+    str,
+    typer.Argument(
+        metavar="ROBOT", help="A bundled robot's name, or a .toml, .urdf, MJCF .xml or DH .csv file."
+    ),
 ]
 TrajectoryPath = Annotated[Path, typer.Argument(metavar="TRAJ", help="A trajectory.npz, as walk writes it.")]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]

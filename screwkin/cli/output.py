@@ -14,6 +14,9 @@ from screwkin.errors import MissingDependencyError, RobotRemark
 
 T = TypeVar("T")
 
+LONGEST = 300
+"""Characters of a remark beyond which its names are counted."""
+
 
 def print_json(data: Mapping[str, Any]) -> None:
     """One JSON object on stdout; numbers that JSON does not know (NaN, infinity) become null."""
@@ -42,19 +45,27 @@ def remark(text: str) -> None:
 
 @contextmanager
 def remarks_of_robots() -> Iterator[None]:
-    """What robots' files leave open, read inside, is a remark each and not a warning with a line of code."""
+    """What robots' files leave open, read inside, is a remark, once, not a warning with a line of code."""
     with warnings.catch_warnings():
-        shown = warnings.showwarning
+        shown, said = warnings.showwarning, set[str]()
 
         def show(message: Warning | str, category: type[Warning], *place: Any, **rest: Any) -> None:
             if issubclass(category, RobotRemark):
-                remark(f"remark: {message}")
+                if str(message) not in said:
+                    remark(shortened(f"remark: {message}"))
+                said.add(str(message))
             else:
                 shown(message, category, *place, **rest)
 
         warnings.simplefilter("always", RobotRemark)
         warnings.showwarning = show
         yield
+
+
+def shortened(text: str) -> str:
+    """A remark whose list of names is cut where it becomes longer than a paragraph."""
+    head, more = text[:LONGEST].rpartition(", ")[0], text[LONGEST:].count(", ")
+    return f"{head} and {more + 1} more" if more else text
 
 
 def drawn(draw: Callable[[], Sequence[T]]) -> Sequence[T]:

@@ -10,14 +10,19 @@ from typing import Annotated
 import typer
 
 from screwkin.analysis.account import Account, account_of
+from screwkin.anatomy.humanoid import anatomy
 from screwkin.cli.compensated import CompensateBy, Passes, ServoStiffness, compensated, remedy
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, RobotName, settings
 from screwkin.cli.output import aligned, drawn, print_json, progress_bar, remark
+from screwkin.errors import InputError
+from screwkin.files import atomic_write
 from screwkin.gait.files import default_gait, load_gait
+from screwkin.gait.fitting import fitting_gait
 from screwkin.gait.record import Gait
 from screwkin.gait.walk import walk as walk_of
-from screwkin.model.robot import Robot
+from screwkin.gait.write import gait_toml
+from screwkin.model.robot import Robot, robot_text
 from screwkin.model.table import load_robot
 from screwkin.report.numbers import walk_data, walk_numbers
 
@@ -28,6 +33,9 @@ def walk(
         str | None,
         typer.Option(metavar="NAME|FILE", help="A bundled gait's name or a file; default: ROBOT-… or walk."),
     ] = None,
+    auto: Annotated[
+        bool, typer.Option("--auto", help="A gait that fits the robot; limbs are found where none are named.")
+    ] = False,
     steps: Annotated[int | None, typer.Option(help="Number of steps; default: the gait's.")] = None,
     assignments: Annotated[
         list[str] | None,
@@ -52,25 +60,32 @@ def walk(
     outside the support polygon is a warning; the trajectory is written all the same.
     """
     table = load_robot(robot)
+    if auto and not table.limbs:
+        table = limbed(table)
     wanted = remedy(table, compensate, passes, k)
     assignments = [*(assignments or []), *([] if com is None else [f"com={com}"])]
+    if auto and gait is not None:
+        raise InputError("--auto chooses the gait; leave --gait out")
     name = gait or default_gait(table.name)
-    chosen = chosen_gait(name, assignments, rate)
+    chosen = changed(fitting_gait(table), assignments, rate) if auto else chosen_gait(name, assignments, rate)
     steps = chosen.steps if steps is None else steps
-    command = command_of(robot, name, steps, assignments, rate)
+    command = command_of(robot, None if auto else name, steps, assignments, rate)
     with output_folder(output, "walk", table.name) as folder:
         account, remedied = _planned(table, chosen, steps, command), None
         if wanted is not None:
             command = shlex.join([*shlex.split(command), *wanted.words])
             remedied = compensated(table, account.trajectory, wanted, command, folder)
         _save(account, folder)
+        if auto:
+            write_auto(table, chosen, folder)
         if remedied is not None:
             remedied.save()
         if plots:
             write_report(account, folder)
     if as_json:
         extra = {} if remedied is None else {"compensation": remedied.to_dict()}
-        print_json({**walk_data(account), "gait": chosen.name, "folder": str(folder), **extra})
+        used = chosen.to_dict() if auto else chosen.name
+        print_json({**walk_data(account), "gait": used, "folder": str(folder), **extra})
     else:
         _print_summary(account, chosen, folder)
         if remedied is not None:
@@ -79,17 +94,39 @@ def walk(
 
 
 def chosen_gait(name: str, assignments: Sequence[str], rate: float | None) -> Gait:
+    """The gait of that name with what the command line changes of it."""
+    return changed(load_gait(name), assignments, rate)
+
+
+def changed(gait: Gait, assignments: Sequence[str], rate: float | None) -> Gait:
     """The gait with what the command line changes of it."""
     changes: dict[str, str | float] = {**settings(list(assignments))}
     if rate is not None:
         changes["rate"] = rate
-    gait = load_gait(name)
     return gait.replace(**changes) if changes else gait
 
 
-def command_of(robot: str, gait: str, steps: int, assignments: Sequence[str], rate: float | None) -> str:
+def limbed(robot: Robot) -> Robot:
+    """The robot with limbs, soles and home found from its geometry, and a remark on stderr for each."""
+    found = anatomy(robot)
+    for text in (*map(str, found.findings), *found.remarks):
+        remark(text)
+    return found.robot
+
+
+def write_auto(robot: Robot, gait: Gait, folder: Path) -> None:
+    """The gait that was chosen and the robot that walks it, as files that ``walk`` takes."""
+    for name, text in (("auto.toml", gait_toml(gait)), ("robot.toml", robot_text(robot))):
+        with atomic_write(folder / name) as file:
+            file.write(text)
+
+
+def command_of(
+    robot: str, gait: str | None, steps: int, assignments: Sequence[str], rate: float | None
+) -> str:
     """The command line that plans the same trajectory again, wherever its files go."""
-    words = ["screwkin", "walk", robot, "--gait", gait, "--steps", str(steps)]
+    words = ["screwkin", "walk", robot, *(["--auto"] if gait is None else ["--gait", gait])]
+    words += ["--steps", str(steps)]
     words += [word for text in assignments for word in ("--set", text)]
     words += [] if rate is None else ["--rate", f"{rate:g}"]
     return shlex.join(words)

@@ -9,6 +9,7 @@ from screwkin.compiler.program import Program
 from screwkin.dynamics.quantities import balance, ground_wrench, inverse_dynamics, mass_matrix, momentum
 from screwkin.errors import UnknownNameError
 from screwkin.gait.driven import driven
+from screwkin.gait.realise import free_rotations
 from screwkin.ik.closed import recognised
 from screwkin.ik.programs import limb_programs_of
 from screwkin.kinematics.body import (
@@ -60,12 +61,17 @@ def _walk(robot: Robot) -> list[Program]:
     limbs = solvable_limbs(moving, mechanism.secondary)
     motion = [motion_program(moving, True, limbs)] if limbs else []
     forces = balance.definition.door(robot, balance.definition.inputs(robot), ()).guarded
-    return [*limb_programs_of(moving), *motion, block_values(moving, *mechanism.choice), forces]
+    free = {tip: names for tip, names in free_rotations(mechanism).items() if len(names) < 3}
+    return [*limb_programs_of(moving, free), *motion, block_values(moving, *mechanism.choice), forces]
 
 
 def _maps(robot: Robot) -> list[Program]:
     chains = [SerialChain.of(robot, limb.name) for limb in robot.limbs]
-    return [map_program(robot, chain) for chain in chains if recognised(chain) is not None]
+    return [
+        map_program(robot, chain)
+        for chain in chains
+        if len(chain.joints) > 5 and recognised(chain) is not None
+    ]
 
 
 def _rates(robot: Robot) -> list[Program]:

@@ -14,7 +14,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array
 from screwkin.errors import ScrewkinError
-from screwkin.gait.driven import Driven, driven
+from screwkin.gait.driven import Driven, arms_of, driven
 from screwkin.gait.plan import Plan, plan
 from screwkin.gait.preview_plan import preview_plan
 from screwkin.gait.reach import on_other_branch, refuse_turns
@@ -56,8 +56,7 @@ def coarse_walks(robot: Robot, gaits: Sequence[Gait], steps: int = STEPS) -> lis
         gaits: fitted to it.
         steps: at most ``STEPS`` are planned.
     """
-    arms = tuple(limb.name for limb in robot.limbs if limb.kind != "leg")
-    whole, drive = stance_of(robot), driven(robot, arms)
+    whole, drive = stance_of(robot), driven(robot, arms_of(robot))
     mechanism, stance = closed_mechanism(drive.moving), drive.stance(whole)
     offset = _com_at_home(robot)
     plans = [_plan(mechanism, stance, offset, gait, min(steps, STEPS)) for gait in gaits]

@@ -28,6 +28,10 @@ POSE, POSITION = 6, 3
 """Joints with which a limb follows a pose, and a position."""
 _AROUND = 0.3
 """How far from home, joint by joint, the choice of a limb's joints looks [rad or m]."""
+_LEAST = 0.01
+"""Least room of a joint, which stands at its limit."""
+_GOOD = 0.5
+"""Share of the best volume from which a leg takes the joints nearer to the base."""
 _EQUAL = 1e-6
 """Relative difference below which two choices are equally good; the joints nearer to the base win."""
 
@@ -86,8 +90,9 @@ class Driven:
 def driven(robot: Robot, at_rest: tuple[str, ...] = ()) -> Driven:
     """What a gait drives of a robot with a ``home`` posture.
 
-    Legs follow poses with up to six joints of their own. Arms follow poses with six joints, positions with
-    three; with fewer than three they rest. A robot with closures is driven as a whole.
+    Legs follow poses with up to six joints of their own. Arms of six joints follow poses, of any other number
+    positions with the three that move the hand best; with fewer than three they rest. A robot with closures
+    is driven as a whole.
 
     Args:
         robot: with a ``home`` posture.
@@ -95,6 +100,11 @@ def driven(robot: Robot, at_rest: tuple[str, ...] = ()) -> Driven:
     """
     moving, joints, home, resting, turned = _moving(robot, at_rest)
     return Driven(robot, moving or robot, joints, home, resting, at_rest, turned)
+
+
+def arms_of(robot: Robot) -> tuple[str, ...]:
+    """Names of the limbs that are no legs."""
+    return tuple(limb.name for limb in robot.limbs if limb.kind != "leg")
 
 
 Parts = tuple[Robot | None, tuple[int, ...], Array, tuple[str, ...], Mapping[str, Array]]
@@ -142,12 +152,16 @@ def _chosen(robot: Robot, limb: Limb, home: Array) -> tuple[int, ...]:
     if limb.kind == "leg":
         count = min(POSE, len(own))
     else:
-        count = next((n for n in (POSE, POSITION) if n <= len(own)), 0)
+        count = POSE if len(own) == POSE else POSITION if len(own) >= POSITION else 0
     return tuple(own) if count == len(own) else _best(robot, limb, own, count, home)
 
 
 def _best(robot: Robot, limb: Limb, own: Sequence[int], count: int, home: Array) -> tuple[int, ...]:
-    """The ``count`` joints that move a tip best: largest volume of their columns, at home and around it."""
+    """The ``count`` joints that move a tip best: largest volume of their columns, at home and around it.
+
+    A joint counts by its room to the nearer of its limits. Of a leg, joints near the base are preferred where
+    they are half as good as any: so toes rest, not ankles.
+    """
     if not count:
         return ()
     path, rows = robot.path_to(limb.link), slice(0, 6) if count == POSE else slice(3, 6)
@@ -156,12 +170,18 @@ def _best(robot: Robot, limb: Limb, own: Sequence[int], count: int, home: Array)
         np.array(tree_positions(robot, home.tolist()))[list(path)],
     )
     offsets = [np.zeros(len(path)), *(s * _AROUND * e for e in np.eye(len(path)) for s in (1, -1))]
+    joints = [robot.joints[i] for i in own]
+    room = {
+        i: float(np.clip(min(home[i] - joint.lower, joint.upper - home[i]) / _AROUND, _LEAST, 1.0))
+        for i, joint in zip(own, joints, strict=True)
+    }
     total = dict.fromkeys(combinations(own, count), 0.0)
     for offset in offsets:
         thetas = list(start + offset)
         tip = successive_displacement(screws, thetas, A_ref_k=limb.frame).p
         columns = [as_array(at(tip, column)).astype(float)[rows] for column in chain_jacobian(screws, thetas)]
         for choice in total:
-            total[choice] += abs(np.linalg.det(np.stack([columns[path.index(i)] for i in choice])))
-    best = max(total.values())
-    return next(choice for choice, volume in total.items() if volume >= (1 - _EQUAL) * best)
+            scaled = [room[i] * columns[path.index(i)] for i in choice]
+            total[choice] += abs(np.linalg.det(np.stack(scaled)))
+    best, share = max(total.values()), _GOOD if limb.kind == "leg" else 1 - _EQUAL
+    return next(choice for choice, volume in total.items() if volume >= share * best)

@@ -1,4 +1,4 @@
-"""A gait that fits a robot: how large, fast and bent its steps may be, by its own limits, speeds and torques.
+"""A gait that fits a robot: how large, quick and bent its steps may be by limits, speeds and torques.
 
 The search goes from large, quick steps on bent legs to small, slow ones on straight legs. Many gaits are
 tried coarsely in one batch; the first promising ones are planned in full and judged by the model alone.
@@ -6,9 +6,8 @@ tried coarsely in one batch; the first promising ones are planned in full and ju
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
 
@@ -18,22 +17,21 @@ from screwkin.gait.feed_forward import walking_torques
 from screwkin.gait.files import load_gait
 from screwkin.gait.lengths import fitted
 from screwkin.gait.record import Gait
-from screwkin.gait.walk import walk
+from screwkin.gait.walk import planned_walk
 from screwkin.model.robot import Robot
 from screwkin.trajectory import Trajectory
 
-SIZES = ((0.3, 0.06), (0.2, 0.06), (0.15, 0.05), (0.1, 0.04), (0.05, 0.03))
-"""Stride and lift in leg lengths, from large to small."""
-BENDS = (0.93, 0.96, 0.9, 0.87, 0.98, 0.83, 0.78, 0.7)
-"""Heights of the hips, in leg lengths, in the order of preference."""
+TRIES = (
+    (0.3, 0.06, (0.93, 0.9, 0.87, 0.83, 0.78)),
+    (0.2, 0.06, (0.93, 0.96, 0.9, 0.87, 0.83, 0.78, 0.7)),
+    (0.1, 0.04, (0.97, 0.95, 0.93, 0.9, 0.87, 0.83, 0.78, 0.7)),
+    (0.05, 0.03, (0.98, 0.96, 0.93, 0.9, 0.87, 0.83, 0.78, 0.7)),
+)
+"""Stride, lift and heights of the hips, in leg lengths: from large steps to small ones on straighter legs."""
 PERIODS = (3.5, 4.5, 6.0)
 """Of a step, in periods of a pendulum as long as the legs over 2 pi."""
 USE = 0.9
 """Share of a joint's speed and torque that a gait may take."""
-INSIDE = 0.15
-"""Least distance of the ZMP inside the support polygon, in halves of its narrower side while on one foot."""
-_FULL = 4
-"""Gaits that are planned in full before the search gives up."""
 _STEPS = 3
 
 
@@ -65,36 +63,37 @@ def fitting_gait(robot: Robot) -> Gait:
         True
     """
     expect(robot, Robot, "robot", 'load_robot("NAME")')
-    base, tried = fitted(load_gait("auto"), robot), []
+    base, tried = fitted(load_gait("auto"), robot), list[_Judged]()
     for period in PERIODS:
-        gaits = [base.replace(period=period, **changes) for changes in _changes()]
-        promising = [
-            gait
-            for gait, walked in zip(gaits, coarse_walks(robot, gaits), strict=True)
-            if walked is not None and walked.reached and _slow(robot, walked)
-        ]
-        for gait in promising[:_FULL]:
+        for gait in _promising(robot, base.replace(period=period)):
             tried.append(_judged(robot, gait))
             if not tried[-1].reasons:
                 return gait
     raise NoSolutionError(_refusal(robot, base, tried))
 
 
-def _changes() -> Iterator[Mapping[str, str | float]]:
-    """What changes from gait to gait: sizes first, since a smaller step asks less of everything."""
-    for (stride, lift), bend in product(SIZES, BENDS):
-        yield {"stride": f"{stride:g}*leg", "lift": f"{lift:g}*leg", "bend": bend}
+def _promising(robot: Robot, base: Gait) -> list[Gait]:
+    """Of every size the first gait that the legs can follow, coarsely, at speeds that they have."""
+    several = [
+        [base.replace(stride=f"{stride:g}*leg", lift=f"{lift:g}*leg", bend=bend) for bend in bends]
+        for stride, lift, bends in TRIES
+    ]
+    walks = iter(coarse_walks(robot, [gait for gaits in several for gait in gaits]))
+    good = [[gait for gait in gaits if _possible(robot, next(walks))] for gaits in several]
+    return [gaits[0] for gaits in good if gaits]
 
 
-def _slow(robot: Robot, walked: Coarse) -> bool:
-    """Whether the joints of a coarse walk stay below their greatest speeds."""
+def _possible(robot: Robot, walked: Coarse | None) -> bool:
+    """Whether a coarse walk is in reach, and its joints stay below their greatest speeds."""
+    if walked is None or not walked.reached:
+        return False
     speeds = np.abs(np.gradient(walked.q, walked.time, axis=0)).max(axis=0)
     return bool((speeds <= [joint.velocity for joint in robot.joints]).all())
 
 
 def _judged(robot: Robot, gait: Gait) -> _Judged:
     try:
-        trajectory = walk(robot, gait, _STEPS)
+        trajectory = planned_walk(robot, gait, _STEPS)
     except ScrewkinError as error:
         return _Judged(gait, (str(error),))
     return _Judged(gait, (*_unbalanced(trajectory), *_overloaded(robot, trajectory)))
@@ -124,7 +123,8 @@ def _refusal(robot: Robot, base: Gait, tried: Sequence[_Judged]) -> str:
         best = min(tried, key=lambda judged: len(judged.reasons))
         size = f"stride {best.gait.stride:.3g} m, Tc {best.gait.Tc:.3g} s"
         return f"{robot.name}: no gait fits; with {size}: {'; '.join(best.reasons)}"
-    smallest = base.replace(**list(_changes())[-len(BENDS)])
+    stride, lift, _ = TRIES[-1]
+    smallest = base.replace(stride=f"{stride:g}*leg", lift=f"{lift:g}*leg")
     reasons = _judged(robot, smallest).reasons
     why = "; ".join(reasons) or "joints would be faster than they can"
     return f"{robot.name}: no gait fits; with stride {smallest.stride:.3g} m: {why}"

@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from screwkin.errors import LimitError, SingularError, UnreachableError
-from screwkin.gait.driven import Driven, driven
+from screwkin.gait.arms import unable_arms
+from screwkin.gait.driven import Driven, arms_of, driven
 from screwkin.gait.lengths import lengths_of
 from screwkin.gait.plan import Plan, plan
 from screwkin.gait.preview_plan import preview_plan
-from screwkin.gait.realise import differentiate, positions
+from screwkin.gait.realise import differentiate, posed_hands, positions
 from screwkin.gait.record import Gait
 from screwkin.gait.stance import stance_of
 from screwkin.ik.pose_solution import PoseSolution
@@ -61,9 +62,15 @@ def follow(robot: Robot, gait: Gait, steps: int, at_rest: tuple[str, ...] = ()) 
         GaitError, InputError, NoSolutionError: as ``plan`` and ``preview_plan``.
     """
     whole, notes = stance_of(robot), tuple[str, ...]()
+    if gait.arms == "rest":
+        at_rest = arms_of(robot)
     while True:
         drive = driven(robot, at_rest)
         mechanism, stance = closed_mechanism(drive.moving), drive.stance(whole)
+        if unable := unable_arms(drive.moving, gait, stance, posed_hands(mechanism)):
+            at_rest = (*at_rest, *unable)
+            notes += tuple(_rests(robot, gait, arm, why) for arm, why in unable.items())
+            continue
         try:
             if gait.kind == "preview":
                 planned = preview_plan(mechanism, gait, stance, steps)
@@ -74,7 +81,11 @@ def follow(robot: Robot, gait: Gait, steps: int, at_rest: tuple[str, ...] = ()) 
         except (UnreachableError, SingularError, LimitError) as error:
             if error.limb not in [limb.name for limb in robot.limbs if limb.kind != "leg"]:
                 raise
-            drop = f"hand_drop is {gait.hand_drop:g}, at home {lengths_of(robot)['arm']:.3g}"
-            at_rest, notes = (*at_rest, error.limb), (*notes, f"{error.limb} rests: {error}; {drop}")
+            at_rest, notes = (*at_rest, error.limb), (*notes, _rests(robot, gait, error.limb, str(error)))
         else:
             return Followed(drive, mechanism, planned, solution, motion, notes)
+
+
+def _rests(robot: Robot, gait: Gait, arm: str, why: str) -> str:
+    at_home = lengths_of(robot)["arm"]
+    return f"{arm} rests: {why}; hand_drop is {gait.hand_drop:g}, at home {at_home:.3g}"

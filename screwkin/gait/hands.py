@@ -1,4 +1,4 @@
-"""The hands: they swing fore and aft below their shoulders, relative to the waist."""
+"""The hands: they swing fore and aft about where they hang at home, relative to the waist."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def hands_motion(gait: Gait, stance: Stance, waist: Motion, phase: Motion) -> di
 
     Args:
         gait: its channels of the hands.
-        stance: shoulders in the waist frame [m].
+        stance: hands at home, in the waist frame [m].
         waist: x, y, z, yaw (T, 4) in the world [m and rad].
         phase: (T,) [steps].
     """

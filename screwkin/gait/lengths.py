@@ -4,7 +4,7 @@
 as far as joints and limits allow, soles level. ``waist``: height of the steered frame above the hips (0
 unless the table has a ``[waist]``), so that ``waist_height = "0.93*leg + waist"`` fits every robot. ``hip``:
 distance between the hips. ``sole``: length of the shorter sole, along the foot's x axis. ``arm``: how far the
-hands hang below their shoulders at home (of the shorter arm; of a robot without hands, half a leg).
+hands hang below their shoulders at home (of the shorter arm; where none hangs, half a leg).
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, norm
 from screwkin.compiler.program import kept
-from screwkin.gait.driven import driven
+from screwkin.gait.driven import arms_of, driven
 from screwkin.gait.realise import free_rotations
 from screwkin.gait.record import Gait, gait_from_dict
 from screwkin.gait.stance import stance_of
@@ -81,7 +81,7 @@ def lengths_of(robot: Robot) -> Mapping[str, float]:
         "hip": float(norm(hips[0] - hips[1])),
         "sole": float(min(soles)),
         "waist": 0.0 - hip_height,
-        "arm": max(min(drops, default=0.5 * leg), 0.0),
+        "arm": min((drop for drop in drops if drop > 0), default=0.5 * leg),
     }
     return MappingProxyType({name: float(f"{value:.9g}") for name, value in values.items()})
 
@@ -93,8 +93,7 @@ def stretched(robot: Robot, of: str = "waist") -> float:
         robot: with legs, soles and a ``home`` posture.
         of: name of a leg's tip: of this leg alone; ``"waist"``: of all.
     """
-    arms = tuple(limb.name for limb in robot.limbs if limb.kind != "leg")
-    drive, waist = driven(robot, arms), waist_frame(robot)
+    drive, waist = driven(robot, arms_of(robot)), waist_frame(robot)
     free = free_rotations(closed_mechanism(drive.moving))
     moving, q = drive.moving, np.array(drive.moving.posture("home").q)
     D = link_displacements(moving, q.tolist())

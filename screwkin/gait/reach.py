@@ -16,6 +16,7 @@ from screwkin.gait.plan import Plan
 from screwkin.ik.pose import solve_pose
 from screwkin.ik.pose_solution import PoseSolution
 from screwkin.kinematics.landmarks import limb_root, waist_frame
+from screwkin.kinematics.limits import limited_joints
 from screwkin.kinematics.positions import (
     chain_jacobian,
     link_displacements,
@@ -137,13 +138,17 @@ def _refuse_other_branch(
     if not len(other):
         return
     path, start = list(robot.path_to(limb.link)), np.array(robot.posture("home").q, dtype=float)
-    sample, wide = int(other[0]), [replace(j, lower=-np.inf, upper=np.inf) for j in robot.joints]
+    sample, joints, endless = int(other[0]), limited_joints(robot), np.inf
     one = {name: target[sample] for name, target in targets.items()}
-    unlimited = replace(robot, joints=tuple(wide))
+    unlimited = replace(
+        robot,
+        joints=tuple(replace(joint, lower=-endless, upper=endless) for joint in robot.joints),
+        coupled=tuple(replace(joint, lower=-endless, upper=endless) for joint in robot.coupled),
+    )
     near = solve_pose(unlimited, one, State(plan.T_world_base[sample], start), free=free).state.q
-    beyond = [max(robot.joints[i].lower - near[i], near[i] - robot.joints[i].upper) for i in path]
+    beyond = [max(joints[i].lower - near[i], near[i] - joints[i].upper) for i in path]
     worst = path[int(np.argmax(beyond))]
-    joint = robot.joints[worst]
+    joint = joints[worst]
     factor, unit = (1e3, "mm") if joint.type == "prismatic" else (180 / np.pi, "deg")
     when = f"{limb.name}, sample {sample} (t = {float(plan.time[sample]):.3f} s)"
     limits = f"limits {factor * joint.lower:.1f} to {factor * joint.upper:.1f} {unit}"

@@ -70,7 +70,7 @@ def targets_of(mechanism: Mechanism, planned: Plan) -> dict[str, Array]:
     home = link_displacements(robot, list(robot.posture("home").q))
     targets: dict[str, Array] = dict(planned.T_world_tip)
     for hand, position in planned.hand_position.items():
-        if not _turns(mechanism, hand):
+        if hand not in posed_hands(mechanism):
             targets[hand] = position
             continue
         level = as_array(pose_in_base(robot, home, hand).R)
@@ -81,9 +81,10 @@ def targets_of(mechanism: Mechanism, planned: Plan) -> dict[str, Array]:
     return targets
 
 
-def _turns(mechanism: Mechanism, tip: str) -> bool:
-    """True if the rotations of a tip's chain are imposed, not monitored."""
-    return any(name.startswith(f"{tip}.r") for name in mechanism.primary)
+def posed_hands(mechanism: Mechanism) -> tuple[str, ...]:
+    """Tips of arms the rotations of whose chains are imposed, not monitored."""
+    tips = [limb.tip for limb in mechanism.robot.limbs if limb.kind != "leg"]
+    return tuple(tip for tip in tips if any(name.startswith(f"{tip}.r") for name in mechanism.primary))
 
 
 def differentiate(mechanism: Mechanism, planned: Plan, state: State) -> JointMotion:

@@ -32,6 +32,7 @@ CHOICES: Mapping[str, tuple[str, ...]] = {
     "footholds": ("alternate", "close", "parallel"),
     "com": ("true", "waist"),
     "first": ("right", "left"),
+    "arms": ("follow", "rest"),
 }
 """Parameters that choose; the first one is the default."""
 
@@ -66,7 +67,8 @@ class Gait:
     about the vertical. lift: height of a swing. waist_height: of the waist above the floor. hand_drop: hands
     below their shoulders. sway: factor on the lateral motion of the waist. spread: added to each foot's
     distance from the middle. ramp: steps over which the gait starts and stops (0: at once). steps: how many,
-    by default. rate: samples per second. footholds: ``alternate`` (each foot passes the other),
+    by default. rate: samples per second. arms: ``follow`` their hands, or ``rest``
+    at home. footholds: ``alternate`` (each foot passes the other),
     ``close`` (one leads, the other closes up) or ``parallel`` (as alternate, but from feet side by side to
     feet side by side); first: the foot that swings first. com: what a preview gait steers, the ``true`` CoM
     of all links or, naively, the ``waist``.
@@ -95,6 +97,7 @@ class Gait:
     footholds: Footholds
     first: Side
     com: Literal["true", "waist"]
+    arms: Literal["follow", "rest"]
     numbers: Mapping[str, float]
     channels: Mapping[str, Channel]
     waist: Mapping[str, tuple[float, ...]]

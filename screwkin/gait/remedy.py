@@ -15,6 +15,7 @@ import numpy as np
 
 from screwkin.errors import NoSolutionError, ScrewkinError
 from screwkin.gait.coarse import coarse_walks
+from screwkin.gait.driven import arms_of
 from screwkin.gait.follow import follow
 from screwkin.gait.lengths import lengths_of, stretched
 from screwkin.gait.record import Gait
@@ -64,7 +65,7 @@ class _Trial:
     def works(self, changes: Mapping[str, float]) -> bool:
         """Whether the robot follows the gait with some numbers changed."""
         try:
-            follow(self.robot, self.gait.replace(**changes), self.steps, _arms(self.robot))
+            follow(self.robot, self.gait.replace(**changes), self.steps, arms_of(self.robot))
         except ScrewkinError:
             return False
         return True
@@ -139,10 +140,6 @@ def _together(trial: _Trial, moves: Mapping[str, float]) -> Iterator[str]:
         now = ", ".join(f"{key} {getattr(gait, key):g}" for key in good)
         listed = ", ".join(f"{key} {value:g}" for key, value in good.items())
         yield f"{now} do not fit together: {listed} work"
-
-
-def _arms(robot: Robot) -> tuple[str, ...]:
-    return tuple(limb.name for limb in robot.limbs if limb.kind != "leg")
 
 
 def _unknown(gait: Gait) -> str:

@@ -17,6 +17,8 @@ from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.model.robot import Limb, Robot
 
 LEFT, RIGHT = 1, -1
+DIGITS = 12
+"""Decimals [m] of the places of hands at home: what is beyond is rounding."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,10 @@ class Foot:
 
 @dataclass(frozen=True)
 class Hand:
-    """A hand: name of its tip, side, and its shoulder (x, y, z) in the waist frame [m]."""
+    """A hand: name of its tip, side, and the point (x, y, z) above it at home, as high as its shoulder [m].
+
+    In the waist frame.
+    """
 
     name: str
     side: int
@@ -100,15 +105,15 @@ def stance_of(robot: Robot) -> Stance:
     D, back = link_displacements(robot, list(robot.posture("home").q)), waist_frame(robot).inverse
     feet, hands, places = [], [], []
     for limb in robot.limbs:
-        y = float((back @ pose_in_base(robot, D, limb.tip).p).y)
-        side = LEFT if y > 0 else RIGHT
+        tip = back @ pose_in_base(robot, D, limb.tip).p
+        side = LEFT if float(tip.y) > 0 else RIGHT
         if limb.kind == "leg":
             sole = tuple((float(x), float(y)) for x, y, _ in sole_corners(robot, limb.tip))
             feet.append(Foot(limb.tip, side, sole, _body(robot, limb)))
-            places.append(abs(y))
+            places.append(abs(float(tip.y)))
         else:
-            x, y, z = back @ limb_root(robot, limb.name)
-            hands.append(Hand(limb.tip, side, (float(x), float(y), float(z))))
+            x, y = (round(float(c), DIGITS) + 0.0 for c in (tip.x, tip.y))
+            hands.append(Hand(limb.tip, side, (x, y, float((back @ limb_root(robot, limb.name)).z))))
     if sorted(foot.side for foot in feet) != [RIGHT, LEFT]:
         raise InputError(f"robot {robot.name} has {len(feet)} legs; a walk needs one on either side")
     return Stance(sum(places) / len(places), tuple(feet), tuple(hands), back)

@@ -55,13 +55,29 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
     """
     expect(robot, Robot, "robot", 'load_robot("NAME")')
     expect(gait, Gait, "gait", 'load_gait("NAME")')
-    table = robot_text(robot)
     gait = fitted(gait, robot)
     steps = gait.steps if steps is None else steps
     try:
-        done = follow(robot, gait, steps)
+        return planned_walk(robot, gait, steps, command)
     except NoSolutionError as error:
         raise with_remedy(error, robot, gait, steps) from None
+
+
+def planned_walk(robot: Robot, gait: Gait, steps: int, command: str = "") -> Trajectory:
+    """The whole-body trajectory of a gait that is fitted to the robot: ``walk`` without remedies.
+
+    Args:
+        robot: with two legs, soles and a ``home`` posture.
+        gait: fitted to it.
+        steps: number of steps, at least 1.
+        command: the command line to record in the file.
+
+    Raises:
+        UnreachableError, SingularError, LimitError: names limb, sample and time.
+        GaitError, InputError: the gait does not fit the robot.
+    """
+    table = robot_text(robot)
+    done = follow(robot, gait, steps)
     drive, planned = done.drive, done.planned
     q = drive.positions(done.solution.state.q)
     qd, qdd = drive.rates(done.motion.qd), drive.rates(done.motion.qdd)

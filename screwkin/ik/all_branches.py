@@ -13,7 +13,7 @@ from screwkin.compiler.program import Program, Recorder
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.compiler.run import run
 from screwkin.ik.closed import EXACT, first_of_its_kind
-from screwkin.ik.eliminated import USABLE, eliminated, elimination, elimination_programs
+from screwkin.ik.eliminated import eliminated, elimination, elimination_programs, exact
 from screwkin.ik.elimination import BRANCHES
 from screwkin.ik.on_limits import on_limits
 from screwkin.ik.polish import iterated, steps
@@ -31,11 +31,12 @@ SIDE = 1e-3
 
 def has_branches(chain: SerialChain) -> bool:
     """True if all branches of the limb can be computed, though it has no closed form."""
-    return relative(chain) is not None or elimination(chain, USABLE) is not None
+    return relative(chain) is not None or elimination(chain) is not None
 
 
-def _by_relative(chain: SerialChain) -> bool:
-    return elimination(chain) is None and relative(chain) is not None
+def by_relative(chain: SerialChain) -> bool:
+    """True if elimination is not exact, and the limb has a relative with a closed form."""
+    return not exact(chain) and relative(chain) is not None
 
 
 def branch_solutions(
@@ -50,7 +51,7 @@ def branch_solutions(
         tolerances: angle [rad] and distance [m] within which limits are preferred to an exact solution.
         batch: shape with B samples.
     """
-    q, error = _near_relative(chain, target) if _by_relative(chain) else eliminated(chain, target)
+    q, error = _near_relative(chain, target) if by_relative(chain) else eliminated(chain, target)
     iterated(chain, q, error, target)
     q = chain.wrapped(q)
     if max(tolerances) > LIMIT_TOLERANCE:
@@ -119,5 +120,5 @@ def relative_branches(chain: SerialChain) -> Program:
 
 def branch_programs(chain: SerialChain) -> list[Program]:
     """What ``branch_solutions`` runs for a limb."""
-    own = [relative_branches(chain)] if _by_relative(chain) else elimination_programs(chain)
+    own = [relative_branches(chain)] if by_relative(chain) else elimination_programs(chain)
     return [*own, steps(chain)]

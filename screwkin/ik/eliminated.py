@@ -6,19 +6,21 @@ and at every zero of it the limb's angles. Nothing depends on a guess, so what i
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 
 from screwkin.algebra.arrays import Array, Integers
 from screwkin.algebra.harmonics import TOUCH, cells, crossing, derivatives, equal_angles, harmonics
-from screwkin.algebra.se3 import Pose, unstack
+from screwkin.algebra.screws import Screw
+from screwkin.algebra.se3 import Pose, Vector, norm, unstack
 from screwkin.compiler.program import Program, Recorder
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.compiler.run import run
 from screwkin.ik.elimination import ANGLES, BRANCHES, Elimination, eliminations, vanishing
 from screwkin.ik.polish import polished
-from screwkin.ik.starts import spread
+from screwkin.ik.starts import box, spread
 from screwkin.kinematics.serial_chain import SerialChain, cached, forward
 
 BLOCK = 512
@@ -29,6 +31,10 @@ EXACT_ENOUGH = 1e-9
 """Error of the given joint [rad] that costs no branches but those that nearly fall together."""
 USABLE = 1e-5
 """Error [rad] above which the determinant vanishes for all poses alike."""
+STIR = 1e-6
+"""How far axes are turned [rad] and moved, over the limb's length, where it does."""
+ROUGHLY = 1e-3
+"""Error [rad] then, up to which Newton's method arrives."""
 STEP = 1e-4
 """Difference of angles [rad] from which the slope of the determinant is computed."""
 ROUNDING = 1e-15
@@ -36,26 +42,52 @@ ROUNDING = 1e-15
 
 
 @cached
-def elimination(chain: SerialChain, largest: float = EXACT_ENOUGH) -> Elimination | None:
-    """The most exact way to eliminate for a limb.
+def elimination(chain: SerialChain) -> Elimination | None:
+    """The most exact way to eliminate for a limb, None where there is none.
 
-    None where none has errors of the given joint up to ``largest`` [rad] at nine of ten poses; any way with
-    as few as ``EXACT_ENOUGH`` is taken without trying others.
+    Where all determinants vanish for all poses alike, as of limbs with several pairs of axes that meet, it is
+    that of a limb whose axes are moved by so little that Newton's method makes up for it.
     """
-    if len(chain.screws) != 6 or not chain.turning.all():
-        return None
-    low = np.where(np.isfinite(chain.lower), chain.lower, -np.pi)
-    high = np.where(np.isfinite(chain.upper), chain.upper, np.pi)
-    q = low + spread(6, POSES, 0) * (high - low)
-    tips, _ = forward(chain.screws, unstack(q), chain.tip)
-    best = None
-    for way in eliminations(chain):
-        error = float(np.quantile(_errors(way, tips, q), 0.9))
-        if error <= largest:
-            best, largest = way, error
-        if error <= EXACT_ENOUGH:
-            break
-    return best
+    best, error = _most_exact(chain)
+    if best is None or error > USABLE:
+        best, error = _most_exact(_stirred(chain))
+    return best if error <= ROUGHLY else None
+
+
+@cached
+def exact(chain: SerialChain) -> bool:
+    """Whether no branches are missed but those that nearly fall together."""
+    return _most_exact(chain)[1] <= EXACT_ENOUGH
+
+
+@cached
+def _most_exact(chain: SerialChain) -> tuple[Elimination | None, float]:
+    """The way with least errors of the given joint, and how large these are at nine of ten poses [rad].
+
+    Any way with errors up to ``EXACT_ENOUGH`` is taken without trying others.
+    """
+    best, least = None, np.inf
+    if len(chain.screws) == 6 and chain.turning.all():
+        low, high = box(chain)
+        q = low + spread(6, POSES, 0) * (high - low)
+        tips, _ = forward(chain.screws, unstack(q), chain.tip)
+        for way in eliminations(chain):
+            error = float(np.quantile(_errors(way, tips, q), 0.9))
+            if error < least:
+                best, least = way, error
+            if error <= EXACT_ENOUGH:
+                break
+    return best, least
+
+
+def _stirred(chain: SerialChain) -> SerialChain:
+    """The limb with axes turned and moved a little, each in another direction."""
+    screws = []
+    for screw, way in zip(chain.screws, spread(6, len(chain.screws), 1) - 0.5, strict=True):
+        turned = screw.s + Vector(*map(float, way[:3])) * STIR
+        moved = screw.s0 + Vector(*map(float, way[3:])) * (STIR * chain.length)
+        screws.append(Screw(turned / norm(turned), moved))
+    return replace(chain, screws=tuple(screws))
 
 
 def _errors(way: Elimination, tips: Pose, q: Array) -> Array:
@@ -144,7 +176,7 @@ def zero(order: int) -> Program:
 @cached
 def equations(chain: SerialChain) -> Program:
     """The table of ``Elimination`` for a pose of the tip."""
-    way = elimination(chain, USABLE)
+    way = elimination(chain)
     assert way is not None
     recorder = Recorder(
         identifier(chain.limb, "equations"),
@@ -166,7 +198,7 @@ def values() -> Program:
 @cached
 def branch(chain: SerialChain) -> Program:
     """The positions of a limb for one zero of the determinant."""
-    way = elimination(chain, USABLE)
+    way = elimination(chain)
     assert way is not None
     recorder = Recorder(
         identifier(chain.limb, "branch"),

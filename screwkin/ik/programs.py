@@ -7,7 +7,7 @@ certifies its answer only where rounding cannot change a decision; ``ik.branches
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 from screwkin.algebra import scalar
@@ -286,7 +286,13 @@ def limb_programs(chain: SerialChain) -> list[Program]:
     return [*closed, *branch_programs(chain)]
 
 
-def limb_programs_of(robot: Robot) -> list[Program]:
-    """The programs worth preparing for inverse kinematics: of limbs whose branches are known."""
-    limbs = [] if robot.closures else [SerialChain.of(robot, limb.name) for limb in robot.limbs]
-    return [program for chain in limbs for program in limb_programs(chain)]
+def limb_programs_of(robot: Robot, free: Mapping[str, tuple[str, ...]] | None = None) -> list[Program]:
+    """The programs worth preparing for inverse kinematics: of limbs whose branches are known.
+
+    Args:
+        robot: the robot.
+        free: by tip, rotations that follow.
+    """
+    limbs = [] if robot.closures else robot.limbs
+    chains = [SerialChain.of(robot, limb.name, (free or {}).get(limb.tip, ())) for limb in limbs]
+    return [program for chain in chains for program in limb_programs(chain)]

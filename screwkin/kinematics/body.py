@@ -47,7 +47,7 @@ def link_poses(robot: Robot, T_world_base: Pose, q: Joints) -> list[Pose]:
 
 @formula
 def frame_pose(robot: Robot, T_world_base: Pose, q: Joints, frame: str) -> Pose:
-    """World pose of ``base``, a link or a tip.
+    """World pose of ``base``, a link, a tip or a named frame.
 
     Args:
         robot: n joints.

@@ -15,6 +15,7 @@ from screwkin.model.records import (
     Box,
     Closure,
     CoupledJoint,
+    Frame,
     Inertia,
     Joint,
     Limb,
@@ -94,6 +95,7 @@ def robot_from_rows(rows: Rows) -> RobotRecord:
             Posture(row.name, row.base_height or 0.0, tuple(row.q.get(joint.name, 0.0) for joint in joints))
             for _, row in rows.good("posture")
         ),
+        frames=tuple(Frame(row.name, row.link, _pose(row.pose)) for _, row in rows.good("frame")),
         waist=None if rows.waist is None else _pose(rows.waist.row),
         servos=rows.servos,
     )

@@ -5,6 +5,7 @@ Others are common in public models: every formula takes them as they stand, with
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -43,6 +44,12 @@ def impossible(inertia: Inertia) -> str:
     return (
         f"{_figures((a, b, c))} break the triangle inequality: {c:.6g} > {a:.6g} + {b:.6g}, no body has them"
     )
+
+
+def radius_of_gyration(inertia: Inertia, mass: float) -> float:
+    """The greatest about any axis through the CoM [m]; 0 without mass."""
+    greatest = float(np.linalg.eigvalsh(inertia_matrix(inertia))[2])
+    return math.sqrt(max(greatest, 0.0) / mass) if mass > 0 else 0.0
 
 
 def is_flat(inertia: Inertia) -> bool:

@@ -16,6 +16,7 @@ from screwkin.model.reading import checked_table
 from screwkin.model.records import (
     Closure,
     CoupledJoint,
+    Frame,
     Joint,
     Limb,
     Link,
@@ -35,6 +36,7 @@ _KINDS: Mapping[str, tuple[str, type]] = {
     "joint": ("joints", Joint),
     "coupled": ("coupled", CoupledJoint),
     "closure": ("closures", Closure),
+    "frame": ("frames", Frame),
     "limb": ("limbs", Limb),
     "sole": ("soles", Sole),
     "posture": ("postures", Posture),

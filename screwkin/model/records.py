@@ -128,6 +128,15 @@ class Closure:
 
 
 @dataclass(frozen=True)
+class Frame:
+    """A named place on a link: of a sensor, a tool, or a link that was fixed to it; ``pose`` in base axes."""
+
+    name: str
+    link: str
+    pose: Pose
+
+
+@dataclass(frozen=True)
 class Limb:
     """A leg or an arm: its tip is a frame on its last link, where its virtual chain is attached."""
 
@@ -171,6 +180,7 @@ class RobotRecord:
         text: of the table that it was read from; empty if there is none.
         path: of that table; empty if there is none.
         coupled: joints that follow one of ``joints``, in table order.
+        frames: named places on links, besides the links' own and the limbs' tips.
     """
 
     name: str
@@ -190,6 +200,7 @@ class RobotRecord:
     text: str = ""
     path: str = ""
     coupled: tuple[CoupledJoint, ...] = ()
+    frames: tuple[Frame, ...] = ()
 
     @cached_property
     def tree(self) -> tuple[Joint, ...]:

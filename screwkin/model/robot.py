@@ -259,7 +259,7 @@ class Robot(RobotRecord):
         return _named(self.postures, name, "posture")
 
     def frame(self, name: str) -> tuple[str, Pose]:
-        """Link and zero pose of a frame: ``base``, a link or a tip.
+        """Link and zero pose of a frame: ``base``, a link, a tip or a named frame.
 
         Args:
             name: of the frame.
@@ -275,6 +275,7 @@ class Robot(RobotRecord):
     @cached_property
     def _frames(self) -> Mapping[str, tuple[str, Pose]]:
         tips = {limb.tip: (limb.link, limb.frame) for limb in self.limbs}
+        tips |= {frame.name: (frame.link, frame.pose) for frame in self.frames}
         links = {link.name: (link.name, link.frame) for link in self.links}
         base = {"base": (self.base_link, IDENTITY)}
         return {**base, **tips, **links, **base}

@@ -139,6 +139,14 @@ class ClosureRow(Row):
     frame_b: FrameRow = Field(description="{ xyz = [x, y, z], rpy = [roll, pitch, yaw] } on link_b")
 
 
+class PlaceRow(Row):
+    """[[frame]]: a named place on a link, such as that of a sensor."""
+
+    name: Name = Field(description="name of the frame")
+    link: Name = Field(description="name of the link that it is fixed to")
+    pose: FrameRow = Field(description="{ xyz = [x, y, z], rpy = [roll, pitch, yaw] }")
+
+
 class LimbRow(Row):
     """[[limb]]: a leg or an arm, and its tip."""
 
@@ -177,6 +185,7 @@ ROWS: Mapping[str, type[Row]] = {
     "link": LinkRow,
     "joint": JointRow,
     "closure": ClosureRow,
+    "frame": PlaceRow,
     "limb": LimbRow,
     "sole": SoleRow,
     "posture": PostureRow,
@@ -191,6 +200,7 @@ _PARTS: Mapping[str, type[Row]] = {
     "frame": FrameRow,
     "frame_a": FrameRow,
     "frame_b": FrameRow,
+    "pose": FrameRow,
     "boxes": BoxRow,
     "shapes": ShapeRow,
     "mimic": MimicRow,

@@ -34,13 +34,13 @@ def _names_certified(robot: RobotRecord) -> bool:
     links, joints, limbs = robot.links, robot.tree, robot.limbs
     inner: list[Any] = [rows for link in links for rows in (link.boxes, link.shapes)]
     inner += [sole.corners for sole in robot.soles]
-    inner += [robot.postures, *(posture.q for posture in robot.postures)]
+    inner += [robot.postures, robot.frames, *(posture.q for posture in robot.postures)]
     if not all(
         isinstance(rows, tuple)
         for rows in (links, robot.joints, robot.coupled, robot.closures, limbs, robot.soles, *inner)
     ):
         return False
-    for rows in (links, joints, robot.closures, limbs, robot.postures):
+    for rows in (links, joints, robot.closures, robot.frames, limbs, robot.postures):
         if len({row.name for row in rows}) < len(rows) or not all(NAME.fullmatch(row.name) for row in rows):
             return False
     named = {link.name for link in links}
@@ -55,6 +55,8 @@ def _names_certified(robot: RobotRecord) -> bool:
         and all(c.link_a != c.link_b and {c.link_a, c.link_b} <= named for c in robot.closures)
         and len(tips) == len(limbs)
         and not tips & {*named, *RESERVED}
+        and not {frame.name for frame in robot.frames} & {*named, *tips, *RESERVED}
+        and all(frame.link in named for frame in robot.frames)
         and all(NAME.fullmatch(tip) for tip in tips)
         and all(limb.link in named and limb.kind in ("leg", "arm") for limb in limbs)
         and all(limb.chain and len({*limb.chain} & {*COUPLINGS}) == len(limb.chain) for limb in limbs)
@@ -77,7 +79,11 @@ def _is_tree(base: str, links: set[str], joints: Sequence[Joint]) -> bool:
 def _numbers_certified(robot: RobotRecord) -> bool:
     joints, limbs, closures = robot.tree, robot.limbs, robot.closures
     free = [tightened(joint, robot.coupled) for joint in robot.joints]
-    frames = [link.frame for link in robot.links] + [limb.frame for limb in limbs]
+    frames = (
+        [link.frame for link in robot.links]
+        + [frame.pose for frame in robot.frames]
+        + [limb.frame for limb in limbs]
+    )
     frames += [] if robot.waist is None else [robot.waist]
     frames += [frame for closure in closures for frame in (closure.frame_a, closure.frame_b)]
     boxes = [box for link in robot.links for box in link.boxes]

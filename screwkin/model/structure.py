@@ -100,7 +100,7 @@ def _sideless(rows: Rows, entry: TableEntry, source: TableEntry, part: tuple[str
 
 def _all_names(rows: Rows, mirrored: list[Mirrored]) -> Iterator[Named]:
     """Everything that has a name, mirrored things included."""
-    for table in ("link", "joint", "closure", "limb", "posture"):
+    for table in ("link", "joint", "closure", "frame", "limb", "posture"):
         for entry in rows[table]:
             if entry.text("name"):
                 yield Named(table, entry.text("name"), entry.where, "name")
@@ -132,7 +132,7 @@ def joint_names(rows: Rows, mirrored: list[Mirrored]) -> list[str]:
 
 def _duplicates(named: list[Named], base: str) -> Iterator[Fault]:
     first: dict[tuple[str, str], str] = {}
-    links = names_of("link", named)
+    links, tips = names_of("link", named), names_of("tip", named)
     for kind, name, where, key in named:
         if (kind, name) in first:
             found = f"there is a {kind} {name!r} already, at {first[kind, name]}"
@@ -141,16 +141,25 @@ def _duplicates(named: list[Named], base: str) -> Iterator[Fault]:
         if kind == "link" and name == "base" and name != base:
             fix = 'Rename it: frame "base" is the base link\'s'
             yield Fault(where, key, "link 'base' is not base_link", fix)
-        if kind == "tip" and name in links:
-            yield Fault(where, key, f"tip {name!r} has the name of a link", "Rename the tip or the link")
-        if kind == "tip" and name in RESERVED:
-            yield Fault(where, key, f"tip {name!r} is a reserved name", f"Not allowed: {listed(RESERVED)}")
+        if kind in ("tip", "frame") and name in links:
+            yield Fault(
+                where, key, f"{kind} {name!r} has the name of a link", f"Rename the {kind} or the link"
+            )
+        if kind == "frame" and name in tips:
+            yield Fault(where, key, f"frame {name!r} has the name of a tip", "Leave it out: a tip is a frame")
+        if kind in ("tip", "frame") and name in RESERVED:
+            yield Fault(where, key, f"{kind} {name!r} is a reserved name", f"Not allowed: {listed(RESERVED)}")
 
 
 def _unknown(rows: Rows, named: list[Named]) -> Iterator[Fault]:
     """Names that are used but not declared."""
     links = names_of("link", named)
-    uses = {"joint": ("parent", "child"), "closure": ("link_a", "link_b"), "limb": ("link",)}
+    uses = {
+        "joint": ("parent", "child"),
+        "closure": ("link_a", "link_b"),
+        "limb": ("link",),
+        "frame": ("link",),
+    }
     places = [(rows.robot, "base_link")]
     places += [(entry, key) for table, keys in uses.items() for entry in rows[table] for key in keys]
     for entry, key in places:

@@ -1,4 +1,4 @@
-"""Robots from files and texts of every format: screw tables, URDF, Denavit-Hartenberg tables."""
+"""Robots from files and texts of every format: screw tables, URDF, MJCF, Denavit-Hartenberg tables."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
-from screwkin.errors import InputError, RobotRemark, TableError, expect
+from screwkin.errors import InputError, RobotRemark, TableError, UnknownNameError, expect
 from screwkin.model.inertias import impossible
 from screwkin.model.library import find_robot
 from screwkin.model.robot import Robot
@@ -14,13 +14,13 @@ from screwkin.model.toml import read_text
 
 
 def load_robot(name_or_path: str | Path, symbolic: bool = False) -> Robot:
-    """The robot of a bundled name, or of a file's path: ``.toml``, ``.urdf``, or a DH ``.csv``.
+    """The robot of a bundled name, or of a file: ``.toml``, ``.urdf``, MJCF ``.xml``, or a DH ``.csv``.
 
     What a URDF file says and a table cannot is a warning (``RobotRemark``), as is an inertia that breaks the
     triangle inequality; ``model.urdf_in.load_urdf`` returns the remarks.
 
     Args:
-        name_or_path: such as ``"linkages/four-bar"`` or ``"my/robot.toml"``.
+        name_or_path: such as ``"linkages/four-bar"`` or ``"my/robot.toml"``, or a folder with one URDF file.
         symbolic: keep the table's parameters as sympy symbols; for a ``.toml`` only.
 
     Returns:
@@ -37,18 +37,28 @@ def load_robot(name_or_path: str | Path, symbolic: bool = False) -> Robot:
         ('crank', 'crank_pin', 'rocker_pin', 'rocker')
     """
     expect(name_or_path, (str, Path), "name_or_path", "a bundled robot's name or the path of a file")
-    path = find_robot(name_or_path)
+    path = _file_in(find_robot(name_or_path))
     if path.suffix.lower() == ".csv":
         from screwkin.model.dh_csv import load_dh
         from screwkin.model.dh_robot import robot_from_dh
 
         _only_numbers(symbolic, str(path), "a DH table")
         return robot_from_dh(load_dh(path), path.stem, str(path))
-    return _read(read_text(path, TableError), str(path), symbolic)
+    return _read(read_text(path, TableError), str(path), symbolic, path)
+
+
+def _file_in(path: Path) -> Path:
+    """The one URDF file of a folder, such as a package of ROS; of a file the file itself."""
+    if not path.is_dir():
+        return path
+    files = sorted(file for file in path.rglob("*") if file.suffix.lower() == ".urdf")
+    if len(files) != 1:
+        raise UnknownNameError("robot, for a folder", str(path), [str(file) for file in files])
+    return files[0]
 
 
 def robot_from_text(text: str, name: str = "<text>", symbolic: bool = False) -> Robot:
-    """The robot of a text: a screw table in TOML, or URDF, which begins with ``<``.
+    """The robot of a text: a screw table in TOML, or URDF or MJCF, which begin with ``<``.
 
     Args:
         text: the content of such a file.
@@ -74,13 +84,18 @@ def robot_from_text(text: str, name: str = "<text>", symbolic: bool = False) -> 
 parse_robot = Robot.from_text
 
 
-def _read(text: str, name: str, symbolic: bool) -> Robot:
-    """The robot of a text in TOML or XML; its remarks are warnings to its caller's caller."""
+def _read(text: str, name: str, symbolic: bool, path: Path | None = None) -> Robot:
+    """The robot of a text in TOML or XML, of a file or not; remarks are warnings to its caller's caller."""
     if text.lstrip("\ufeff \t\r\n").startswith("<"):
+        from screwkin.model.mjcf_in import is_mjcf, parse_mjcf
+        from screwkin.model.srdf import find_srdf
         from screwkin.model.urdf_in import parse_urdf
 
         _only_numbers(symbolic, name, "URDF")
-        read = parse_urdf(text, name)
+        if is_mjcf(text):
+            read = parse_mjcf(text, name)
+        else:
+            read = parse_urdf(text, name, srdf=find_srdf(path) if path else None)
         robot, remarks = read.robot, read.remarks
     else:
         robot = parse_robot(text, name, symbolic)

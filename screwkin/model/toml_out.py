@@ -63,6 +63,7 @@ def table_data(robot: RobotRecord, folder: Path | None = None) -> dict[str, Any]
         "link": [_link(link, origins.get(link.name, ZERO), folder) for link in robot.links],
         "joint": [_joint(joint) for joint in robot.tree],
         "closure": [_row(closure) for closure in robot.closures],
+        "frame": [_row(frame) for frame in robot.frames],
         "limb": [_limb(limb) for limb in robot.limbs],
         "sole": [_row(sole) for sole in robot.soles],
         "waist": {} if robot.waist is None else _frame(robot.waist),

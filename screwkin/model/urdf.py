@@ -68,12 +68,14 @@ def urdf_frames(robot: Robot) -> Mapping[str, Pose]:
 def tip_and_sole_frames(robot: Robot) -> Mapping[str, tuple[str, Pose]]:
     """Link and zero pose of every frame that ``urdf_from_robot`` fixes to a link, by its name in the URDF.
 
-    A tip's frame is the limb's, under its name; a sole's, ``LIMB_sole``, lies in the middle of the corners
-    and is turned as the tip's. A name that a link has already ends in underscores.
+    These are the robot's named frames, its tips and its soles. A tip's frame is the limb's, under its name;
+    a sole's, ``LIMB_sole``, lies in the middle of the corners and is turned as the tip's. A name that a link
+    has already ends in underscores.
     """
     frames: dict[str, tuple[str, Pose]] = {}
     taken = set(robot.link_names)
-    tips = [(limb.tip, limb.link, limb.frame) for limb in robot.limbs]
+    tips = [(frame.name, frame.link, frame.pose) for frame in robot.frames]
+    tips += [(limb.tip, limb.link, limb.frame) for limb in robot.limbs]
     for sole in robot.soles:
         limb, corners = robot.limb(sole.limb), as_array(sole.corners)
         middle = Pose(limb.frame.R, vector_from_array(corners.mean(axis=0)))

@@ -25,10 +25,14 @@ from screwkin.model.inertias import (
     inertia_from_matrix,
     inertia_matrix,
     nearest_body,
+    radius_of_gyration,
     without_noise,
 )
-from screwkin.model.records import Box, CoupledJoint, Inertia, Joint, Link, RobotRecord, Shape
+from screwkin.model.records import Box, CoupledJoint, Frame, Inertia, Joint, Link, RobotRecord, Shape
 from screwkin.model.robot import Robot
+from screwkin.model.shapes import box_points, shape_points
+from screwkin.model.srdf import find_srdf, read_srdf, with_srdf
+from screwkin.model.structure import RESERVED
 from screwkin.model.toml import read_text
 from screwkin.model.toml_out import robot_toml
 from screwkin.model.urdf_joints import Mimic, couplings_of, decomposed, free_root
@@ -47,7 +51,7 @@ from screwkin.model.urdf_xml import (
 
 _UNLIMITED = 1e9  # written by programs that have no word for infinity, this one among them
 _KEPT = {
-    "robot": {"link", "joint", "material"},
+    "robot": {"link", "joint", "material", "mujoco"},
     "joint": {"origin", "parent", "child", "axis", "limit", "mimic"},
 }
 _NO_NAME = re.compile(r"[^A-Za-z0-9_-]+")
@@ -64,7 +68,7 @@ class UrdfRobot:
 
 
 def load_urdf(path: str | Path, repair: bool = False, mimic: Mimic = "couple") -> UrdfRobot:
-    """The robot of a URDF file, with remarks on what a table cannot hold.
+    """The robot of a URDF file and of the SRDF file beside it, with remarks on what a table cannot hold.
 
     Args:
         path: of the file.
@@ -74,10 +78,17 @@ def load_urdf(path: str | Path, repair: bool = False, mimic: Mimic = "couple") -
     Raises:
         TableError: the file cannot be read or has faults; it lists all of them.
     """
-    return parse_urdf(read_text(Path(path), TableError), str(path), repair, mimic)
+    beside = find_srdf(Path(path))
+    return parse_urdf(read_text(Path(path), TableError), str(path), repair, mimic, beside)
 
 
-def parse_urdf(text: str, path: str = "<text>", repair: bool = False, mimic: Mimic = "couple") -> UrdfRobot:
+def parse_urdf(
+    text: str,
+    path: str = "<text>",
+    repair: bool = False,
+    mimic: Mimic = "couple",
+    srdf: Path | None = None,
+) -> UrdfRobot:
     """The robot of a URDF text; its base is fixed if the root link is called ``world``, else floating.
 
     Args:
@@ -87,6 +98,7 @@ def parse_urdf(text: str, path: str = "<text>", repair: bool = False, mimic: Mim
             in the table's ``source``; else they stay as they stand, with a remark.
         mimic: ``couple`` joints that follow others, or read them as ``free`` joints of their own, with their
             coupling as a remark.
+        srdf: a file that says postures, and limbs where this package wrote it; faults in it are remarks.
 
     Raises:
         TableError: the text has faults; it lists all of them.
@@ -107,7 +119,7 @@ def parse_urdf(text: str, path: str = "<text>", repair: bool = False, mimic: Mim
         del links[base]
         base = free.child
     links, joints = decomposed(reader, links, joints)
-    names, shapes = _unique_names(reader, links), shape_reader(reader, root, Path(path).parent)
+    names, shapes = _unique_names(reader, links, base), shape_reader(reader, root, Path(path).parent)
     bodies = _bodies(base, joints, names)
     for name, element in links.items():
         _add_mass(reader, bodies[name], name, element, repair)
@@ -133,25 +145,68 @@ def parse_urdf(text: str, path: str = "<text>", repair: bool = False, mimic: Mim
         base="fixed" if base == "world" and free is None else "floating",
         base_link=names[base],
         links=tuple(parts),
+        frames=_frames(whole, names),
         joints=tuple(leaders),
         coupled=_within_reach(reader, leaders, followers),
     )
     if reader.faults:
         raise TableError(path, reader.faults)
-    lost = "URDF names no limbs, soles and postures: add those that the robot has"
-    return UrdfRobot(Robot.from_text(robot_toml(robot), path), (*reader.remarks, lost))
+    if srdf is not None:
+        robot = _beside(reader, robot, srdf)
+    lost = () if robot.limbs else ("URDF names no limbs, soles and postures: add those that the robot has",)
+    return UrdfRobot(Robot.from_text(robot_toml(robot), path), (*reader.remarks, *lost))
+
+
+def _beside(reader: Reader, robot: RobotRecord, srdf: Path) -> RobotRecord:
+    """The robot with what its SRDF file says, or as it is where that file has faults."""
+    own = Reader()
+    try:
+        content = read_srdf(own, read_text(srdf, TableError), str(srdf))
+    except TableError as wrong:
+        own.faults += wrong.faults
+    if own.faults:
+        reader.note(f"{srdf.name} beside it not read", "; ".join(map(str, own.faults)))
+        return robot
+    reader.notes |= own.notes
+    reader.note("read beside it", srdf.name)
+    return with_srdf(reader, robot, content)
 
 
 def _audit_bodies(
     reader: Reader, bodies: Sequence[_Body], parts: Sequence[Link], base: str, names: Mapping[str, str]
 ) -> None:
-    """Moving without mass, and merged links, are remarks."""
+    """Moving without mass, and inertia that does not fit into the link or the robot, are remarks."""
+    places = np.array([as_array(body.frame.p) for body in bodies])
+    span = float(np.linalg.norm(np.ptp(places, axis=0)))
     for body, part in zip(bodies, parts, strict=True):
-        if len(body.poses) > 1:
-            merged = [name for name in body.poses if names[name] != body.name]
-            reader.note("merged, as fixed to one another", f"{' + '.join(merged)} into {body.name}")
+        reach, what = _extent(part), "the link's extent"
+        if reach == 0:
+            reach, what = span, "the distances between the robot's joints"
+        gyration = radius_of_gyration(part.inertia, part.mass)
+        if gyration > max(reach, 1e-3):
+            reader.note(
+                f"radius of gyration beyond {what}", f"{part.name} ({gyration:.3g} m > {reach:.3g} m)"
+            )
         if not part.mass and base not in body.poses:
             reader.note("moves without mass, which simulators need (Robot.with_inertia_floor)", part.name)
+
+
+def _extent(link: Link) -> float:
+    """Diagonal [m] of the box around a link's boxes and solids; 0 without any, or with a mesh beside them."""
+    if any(shape.kind == "mesh" for shape in link.shapes) or not (link.boxes or link.shapes):
+        return 0.0
+    points = [*map(box_points, link.boxes), *map(shape_points, link.shapes), as_array(link.com)[None]]
+    return float(np.linalg.norm(np.ptp(np.concatenate(points), axis=0)))
+
+
+def _frames(bodies: Iterable[_Body], names: Mapping[str, str]) -> tuple[Frame, ...]:
+    """The links that are fixed to others, as frames of the bodies that they are merged into."""
+    return tuple(
+        Frame(names[link], body.name, pose)
+        for body in bodies
+        for link, pose in body.poses.items()
+        if names[link] != body.name and names[link] not in RESERVED
+    )
 
 
 def _note_left_out(reader: Reader, root: Element, joints: Iterable[Edge]) -> None:
@@ -187,10 +242,10 @@ def _bodies(base: str, joints: Sequence[Edge], names: Mapping[str, str]) -> dict
     return body
 
 
-def _unique_names(reader: Reader, links: Iterable[str]) -> dict[str, str]:
-    """Names that a table allows, one for each link."""
+def _unique_names(reader: Reader, links: Iterable[str], base: str) -> dict[str, str]:
+    """Names that a table allows, one for each link; only the base link may be called ``base``."""
     names: dict[str, str] = {}
-    taken = set[str]()
+    taken = {"base"} - {base}
     for link in links:
         name = _name(link)
         while name in taken:

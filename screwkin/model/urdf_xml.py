@@ -19,8 +19,8 @@ Element = Any
 _DECLARATION = re.compile(r"<\?xml\s[^<>]*\?>")
 _FIX = "Give a URDF file: XML with <robot> around <link> and <joint>"
 _FOREIGN: Mapping[str, str] = {
-    "sdf": "This is SDF, of Gazebo: give the URDF that it was made from",
-    "mujoco": "This is MJCF, of MuJoCo: give the URDF that it was made from",
+    "sdf": "This is SDF, of Gazebo: give the URDF that it was made from, or run sdformat_urdf (of ROS 2)",
+    "mujoco": "This is MJCF, of MuJoCo: load_robot and convert read it",
 }
 _XACRO = "Run xacro first: xacro FILE.xacro > FILE.urdf (of ROS; or: python -m pip install xacro)"
 
@@ -101,6 +101,15 @@ def read_root(text: str, path: str) -> Element:
     if root.tag != "robot":
         raise refused(f"begins with <{root.tag}>", _FOREIGN.get(root.tag, _FIX))
     return root
+
+
+def links_without_inertia(text: str, path: str) -> int:
+    """Number of the links of a URDF that say nothing of their inertia.
+
+    Raises:
+        TableError: the text is no URDF.
+    """
+    return sum(link.find("inertial") is None for link in read_root(text, path).findall("link"))
 
 
 def _is_xacro(root: Element) -> bool:

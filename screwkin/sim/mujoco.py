@@ -1,4 +1,4 @@
-"""The robot in MuJoCo: rigid bodies, motors and contacts. The only file that imports mujoco.
+"""The robot in MuJoCo: rigid bodies, motors and contacts.
 
 The model is built from the table: bodies are links in the table's frames (see ``sim.bodies``), the geometry
 in contact is that of the table's boxes and soles, loops are closed by welds. A motor is dry friction against
@@ -106,10 +106,11 @@ class MuJoCoBackend:
         joints = [self.model.joint(name) for name in robot.joint_names]
         self._qpos = np.array([joint.qposadr[0] for joint in joints], dtype=int)
         self._dof = np.array([joint.dofadr[0] for joint in joints], dtype=int)
-        self._base = self.model.body(robot.base_link).id
+        self._base = self.model.body(_body_name(robot.base_link)).id
         frames = {body.link.name: body for body in bodies}
+        self._links = {self.model.body(_body_name(name)).id: name for name in frames}
         self._feet = [
-            (self.model.body(limb.link).id, frames[limb.link].pose(limb.frame))
+            (self.model.body(_body_name(limb.link)).id, frames[limb.link].pose(limb.frame))
             for limb in robot.limbs
             if limb.kind == "leg"
         ]
@@ -199,7 +200,7 @@ class MuJoCoBackend:
             floor, other = touch.geom
             body = model.geom_bodyid[other if model.geom_bodyid[floor] == 0 else floor]
             force = force if model.geom_bodyid[floor] == 0 else -force
-            yield Contact(model.body(body).name, tuple(touch.pos.tolist()), tuple(force.tolist()))
+            yield Contact(self._links[int(body)], tuple(touch.pos.tolist()), tuple(force.tolist()))
 
     def _ankle_wrench(self, body: int) -> Array:
         """Ground wrench [m; f] about the world origin, from the force in the joint above a foot at rest.
@@ -257,7 +258,7 @@ def _add_bodies(mj: Any, spec: Any, robot: Robot, bodies: tuple[Body, ...], roto
     for body in bodies:
         parent, to_parent = made[body.parent]
         pose = to_parent @ body.frame
-        element = parent.add_body(name=body.link.name, pos=pose[:3, 3], quat=_quat(mj, pose))
+        element = parent.add_body(name=_body_name(body.link.name), pos=pose[:3, 3], quat=_quat(mj, pose))
         if body.parent is not None or robot.base == "floating":
             i = body.inertia
             element.explicitinertial, element.mass = True, float(body.link.mass)
@@ -324,7 +325,7 @@ def _add_closures(mj: Any, spec: Any, robot: Robot, bodies: tuple[Body, ...]) ->
         for side, (link, frame) in zip("ab", ends, strict=True):
             T = frames[link].pose(frame)
             name = f"{closure.name} {side}"
-            spec.body(link).add_site(name=name, pos=T[:3, 3], quat=_quat(mj, T))
+            spec.body(_body_name(link)).add_site(name=name, pos=T[:3, 3], quat=_quat(mj, T))
             names.append(name)
         spec.add_equality(
             name=closure.name,
@@ -335,6 +336,11 @@ def _add_closures(mj: Any, spec: Any, robot: Robot, bodies: tuple[Body, ...]) ->
             solref=[2e-3, 1.0],
             solimp=[STIFFEST, STIFFEST, 1e-3, 0.5, 2.0],
         )
+
+
+def _body_name(link: str) -> str:
+    """A link's name in MuJoCo, which calls its own floor ``world``."""
+    return f"{link} link" if link == "world" else link
 
 
 def _quat(mj: Any, T: Array) -> Array:

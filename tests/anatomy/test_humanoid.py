@@ -18,9 +18,7 @@ from tests.anatomy.bodies import AHEAD, ARM, HIP_Y, LEG, QUARTER, SOLE, biped
 
 UP = {
     "as usual": "0 0 0",
-    "y up": f"{QUARTER} 0 0",
-    "facing backwards": f"0 0 {2 * QUARTER}",
-    "facing sideways": f"0 0 {QUARTER}",
+    "y up, facing backwards": f"{QUARTER} 0 {2 * QUARTER}",
     "askew": "0.3 0.5 1.0",
 }
 

@@ -1,15 +1,19 @@
 """``convert``: any of the three formats into any other, with a word on what is lost."""
 
+import warnings
+
 import numpy as np
 import pytest
 
 from screwkin.algebra.se3 import IDENTITY, as_array
+from screwkin.cli.output import remarks_of_robots, shortened
 from screwkin.errors import RobotRemark
 from screwkin.kinematics.positions import link_displacements
 from screwkin.model.dh_csv import load_dh
 from screwkin.model.table import load_robot
 from screwkin.model.urdf_in import load_urdf
 from tests.model.chains import fk_by_matrices
+from tests.model.urdf_texts import GRIP
 
 
 def displacement(robot, q):
@@ -101,3 +105,31 @@ def test_remarks_about_a_robot_are_lines_of_the_command_line(cli, tmp_path):
     lines = called.err.splitlines()
     assert len(lines) >= 2
     assert all(line.startswith("remark: r.urdf: ") for line in lines)
+
+
+def test_couplings_survive_table_and_urdf_and_are_told_where_they_are_lost(cli, tmp_path):
+    (tmp_path / "grip.urdf").write_text(GRIP)
+    for words in ("grip.urdf grip.toml", "grip.toml again.urdf", "grip.toml grip.csv"):
+        source, target = words.split()
+        called = cli("convert", f"./{source}", target, "--json")
+        assert called.code == 0
+        lost = [remark for remark in called.data["remarks"] if "free in it: f2 = -f1" in remark]
+        assert bool(lost) == (target == "grip.csv")
+    (joint,) = load_urdf(tmp_path / "again.urdf").robot.coupled
+    assert (joint.name, joint.leader, joint.ratio, joint.offset) == ("f2", "f1", -1, 0)
+    assert cli("info", "./grip.toml", "--json").data["coupled_joints"] == {
+        "f2": {"joint": "f1", "ratio": -1.0, "offset": 0.0}
+    }
+    assert "-f1" in cli("table", "./grip.toml").out
+
+
+def test_remarks_stand_once_and_their_lists_of_names_are_cut(capsys):
+    text = "remark: merged: " + ", ".join(f"link_{i}" for i in range(200))
+    with remarks_of_robots():
+        for _ in range(2):
+            warnings.warn(text.removeprefix("remark: "), RobotRemark, stacklevel=1)
+    (line,) = capsys.readouterr().err.splitlines()
+    head, more = line.rsplit(" and ", 1)
+    assert line == shortened(text)
+    assert head.count("link_") + int(more.removesuffix(" more")) == 200
+    assert shortened("remark: short, one") == "remark: short, one"

@@ -90,3 +90,13 @@ def test_every_fault_of_a_table_is_told(cli, refused, tmp_path):
     message = refused(cli("info", "./bad.toml"), 2)
     assert "speed" in message
     assert message.count("bad.toml") > 1
+
+
+def test_every_limb_says_how_its_inverse_kinematics_is_solved(cli):
+    limbs = cli("info", "bioloid", "--json").data["ik"]
+    assert [(limb["limb"], limb["branches"]) for limb in limbs] == [
+        (f"{side}_{part}", count) for part, count in (("leg", 8), ("arm", 4)) for side in ("right", "left")
+    ]
+    assert all(limb["solved"] == 1.0 for limb in limbs)
+    text = cli("info", "bioloid").out
+    assert "closed form: spherical hip  at most 8 branches  100.0% of 32 poses" in text

@@ -219,3 +219,19 @@ def test_plots_and_report_are_written_beside_the_trajectory(cli, tmp_path):
     assert {f"{name}.png" for name in expected} <= names
     assert {"report.html", "trajectory.npz", "trajectory.csv"} <= names
     assert not [name for name in names if name.startswith(".")]
+
+
+def test_auto_chooses_a_gait_and_writes_it_with_the_robot_beside_the_trajectory(cli, tmp_path):
+    told = cli(
+        "walk", "bioloid", "--auto", "--steps", 1, "--rate", 20, "--no-plots", "-o", "a", "--json"
+    ).data
+    assert told["gait"]["gait"]["stride"].endswith("*leg")
+    assert {"leg", "hip", "sole", "waist", "arm"} == {*told["gait"]["lengths"]}
+    assert sk.load_robot(tmp_path / "a" / "robot.toml").name == "bioloid"
+    again = cli(
+        "walk", "bioloid", "--gait", "a/auto.toml", "--steps", 1, "--no-plots", "-o", "b", "--json"
+    ).data
+    one, two = (sk.load_trajectory(tmp_path / folder / "trajectory.npz") for folder in "ab")
+    np.testing.assert_array_equal(one.q, two.q)
+    assert again["gait"] == "auto"
+    assert cli("walk", "bioloid", "--auto", "--gait", "walk").code == 2

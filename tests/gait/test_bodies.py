@@ -13,6 +13,7 @@ import screwkin as sk
 from screwkin.algebra.screws import INFINITE, Screw
 from screwkin.algebra.se3 import UNTURNED, Pose, Vector
 from screwkin.errors import UnreachableError
+from screwkin.gait.driven import driven
 from screwkin.model.robot import Inertia, Joint, Link, Robot
 from screwkin.model.table import parse_robot
 from tests.bodies import LEG, SEVEN, humanoid
@@ -85,6 +86,21 @@ def test_a_leg_without_yaw_names_what_a_turn_needs() -> None:
 def test_arms_of_seven_joints_swing_alike_in_every_process() -> None:
     again = sk.walk(parse_robot(humanoid(**BODIES["seven"])), GAIT, 2)
     np.testing.assert_array_equal(again.q, walked("seven").q)
+
+
+def test_the_toe_of_a_leg_of_seven_joints_rests_and_a_joint_at_its_limit_does_not_lead_an_arm() -> None:
+    robot = parse_robot(humanoid((*LEG, "toe_pitch"), SEVEN))
+    resting = set(robot.joint_names) - set(driven(robot).moving.joint_names)
+    assert {"right_toe_pitch", "left_toe_pitch"} < resting
+    arm = [name for name in driven(robot).moving.joint_names if name.startswith("right_sh")]
+    stuck = tuple(replace(j, lower=0.0) if j.name == "right_shoulder_roll" else j for j in robot.joints)
+    moving = driven(replace(robot, joints=stuck, text="")).moving.joint_names
+    assert "right_shoulder_roll" in arm
+    assert "right_shoulder_roll" not in moving
+    assert (
+        sum("right" in name and ("shoulder" in name or "elbow" in name or "wrist" in name) for name in moving)
+        == 3
+    )
 
 
 PLACES = {

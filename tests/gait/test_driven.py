@@ -74,12 +74,12 @@ def test_idle_and_shared_joints_rest(text: str, rests: str) -> None:
     assert set(robot.joint_names) - set(driven(robot).moving.joint_names) == {rests}
 
 
-@pytest.mark.parametrize(("name", "moving"), [("bioloid", 3), ("bioloid24", 6)])
-def test_the_surplus_of_an_arm_rests_and_rates_are_slopes(name: str, moving: int) -> None:
+@pytest.mark.parametrize("name", ["bioloid", "bioloid24"])
+def test_the_surplus_of_an_arm_rests_and_rates_are_slopes(name: str) -> None:
     robot = with_arm_yaw(sk.load_robot(name))
     drive = driven(robot)
     for limb in drive.moving.limbs[2:]:
-        assert len(drive.moving.path_to(limb.link)) == moving
+        assert len(drive.moving.path_to(limb.link)) == 3
     walked = sk.walk(robot, sk.load_gait("walk").replace(rate=1000, Tc=0.5), steps=1)
     h = walked.time[1] - walked.time[0]
     slope = (walked.q[2:] - walked.q[:-2]) / (2 * h)
@@ -122,3 +122,61 @@ def test_what_is_driven_lasts_as_the_robot_does() -> None:
     del robot
     gc.collect()
     assert gone() is None
+
+
+FINGERS = """
+[[link]]
+name = "right_thumb"
+mass = 0.01
+com = [0, -0.05, -0.02]
+inertia = { box = [0.01, 0.01, 0.04] }
+
+[[link]]
+name = "right_finger"
+mass = 0.01
+com = [0, -0.08, -0.02]
+inertia = { box = [0.01, 0.01, 0.04] }
+
+[[joint]]
+name = "right_thumb"
+parent = "right_forearm"
+child = "right_thumb"
+type = "revolute"
+s = [1, 0, 0]
+s0 = [0, -0.05, 0]
+lower = 0
+upper = 0.8
+
+[[joint]]
+name = "right_finger"
+parent = "right_forearm"
+child = "right_finger"
+type = "revolute"
+s = [1, 0, 0]
+s0 = [0, -0.08, 0]
+mimic = { joint = "right_thumb", ratio = -1.0, offset = 0.1 }
+"""
+
+
+def test_coupled_joints_of_no_limb_rest_with_their_leaders():
+    robot = sk.robot_from_text(sk.load_robot("bioloid").text + FINGERS)
+    drive = driven(robot)
+    assert not drive.moving.coupled
+    assert drive.moving.joint_names == sk.load_robot("bioloid").joint_names
+    assert float(drive.moving.mass) == pytest.approx(float(robot.mass), abs=1e-12)
+    state, less = sk.home(robot), sk.home(drive.moving)
+    coms = [sk.center_of_mass(one, here) for one, here in ((robot, state), (drive.moving, less))]
+    np.testing.assert_allclose(*coms, atol=1e-12)
+
+
+def test_a_joint_coupled_to_a_driven_one_stays_coupled_and_one_within_a_limb_holds_its_leader():
+    text = sk.load_robot("bioloid").text + FINGERS
+    led = sk.robot_from_text(text.replace('joint = "right_thumb", ratio', 'joint = "right_elbow", ratio'))
+    assert [joint.leader for joint in driven(led).moving.coupled] == ["right_elbow", "left_elbow"]
+    rows = sk.load_robot("bioloid").text.splitlines()
+    rows = [row for row in rows if not row.startswith(("right_elbow =", "left_elbow ="))]
+    at = next(i for i, row in enumerate(rows) if row.startswith('name = "right_elbow"'))
+    robot = sk.robot_from_text(
+        "\n".join([*rows[:at], 'mimic = { joint = "right_shoulder_roll" }', *rows[at:]])
+    )
+    assert "right_shoulder_roll" not in driven(robot).moving.joint_names

@@ -37,6 +37,14 @@ def pairs_leg() -> Leg:
     return Leg(np.array(axes, dtype=float), np.array(points, dtype=float), tip)
 
 
+def universal_leg() -> Leg:
+    """A yaw that meets the hip's pitch, a universal ankle, a tilted knee: determinants vanish everywhere."""
+    leg = offset_leg()
+    axes = leg.axes.copy()
+    axes[3] = [0, np.cos(0.1), np.sin(0.1)]
+    return replace(leg, axes=axes)
+
+
 def nearly(leg: Leg, size: float, seed: int) -> Leg:
     """Axes turned and moved by a little: what a table that was measured or rounded holds."""
     rng = np.random.default_rng(seed)
@@ -52,6 +60,7 @@ def random_leg(seed: int) -> Leg:
 
 LEGS = {
     "pairs": pairs_leg(),
+    "two meeting pairs": universal_leg(),
     "random": random_leg(0),
     "parallel to 2e-3": nearly(offset_leg(), 2e-3, 1),
     "meeting to 2e-3": nearly(spherical_leg(), 2e-3, 2),

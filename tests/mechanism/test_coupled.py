@@ -94,8 +94,9 @@ def test_what_takes_every_joint_as_free_refuses_and_names_what_does_not(ask):
 
 
 def test_a_gear_pair_within_a_loop_locks_it_but_for_one_ratio():
-    """A parallelogram turns its coupler back as its crank goes forth: only ratio -1 fits."""
-    bar = changed("s0 = [0, 1, 0]\n", 's0 = [0, 1, 0]\nmimic = { joint = "input", ratio = RATIO }\n', FOURBAR)
+    """A parallelogram turns its coupler back as its crank goes forth: geared at ratio -1 alone it moves."""
+    place = "s0 = [0, 1, 0]\n"
+    bar = changed(place, f'{place}mimic = {{ joint = "input", ratio = RATIO }}\n', FOURBAR)
     rocker = """
 [[link]]
 name = "rocker"

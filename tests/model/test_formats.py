@@ -85,3 +85,12 @@ def test_xacro_is_refused_by_its_suffix_too(tmp_path: Path, monkeypatch: pytest.
     Path("r.urdf.xacro").write_text('<robot xmlns:xacro="http://ros.org/wiki/xacro"><xacro:leg/></robot>')
     with pytest.raises(TableError, match="Run xacro first"):
         load_robot("r.urdf.xacro")
+
+
+def test_a_folder_with_one_urdf_file_is_that_robot(tmp_path: Path) -> None:
+    (tmp_path / "pkg" / "urdf").mkdir(parents=True)
+    (tmp_path / "pkg" / "urdf" / "biped.urdf").write_text(urdf_from_robot(POPPY))
+    assert load_robot_quietly(str(tmp_path / "pkg")).joint_names == POPPY.joint_names
+    (tmp_path / "pkg" / "urdf" / "other.urdf").write_text("")
+    with pytest.raises(UnknownNameError, match=r"biped\.urdf, .*other\.urdf"):
+        load_robot(tmp_path / "pkg")

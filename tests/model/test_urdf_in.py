@@ -110,11 +110,11 @@ def test_what_cannot_be_kept_is_told():
         ("box", "collision"),
     ]
     assert np.isinf(found.robot.joints[0].velocity)
+    assert [(frame.name, frame.link) for frame in found.robot.frames] == [("tool_tip", "upper")]
     told = "\n".join(found.remarks)
     for remark in (
         "left out: transmission",
         "renamed, as a table needs plain names: 'tool tip' to tool_tip",
-        "merged, as fixed to one another: tool tip into upper",
         "mesh files not found, so neither seen nor measured: a.stl",
         "velocity not above 0, taken as no limit: shoulder",
         "URDF names no limbs, soles and postures",
@@ -341,3 +341,20 @@ def test_files_that_are_no_urdf_are_refused(tmp_path):
             parse_urdf(text)
     with pytest.raises(TableError, match="cannot be read"):
         load_urdf(tmp_path / "none.urdf")
+
+
+@pytest.mark.parametrize(
+    ("solid", "remark"),
+    [
+        ("", "radius of gyration beyond the distances between the robot's joints: upper (1 m > 0.3 m)"),
+        ('<sphere radius="0.5"/>', None),
+        ('<sphere radius="0.2"/>', "radius of gyration beyond the link's extent: upper"),
+        ('<mesh filename="a.stl"/>', "radius of gyration beyond the distances"),
+    ],
+)
+def test_an_inertia_that_does_not_fit_into_its_link_is_a_remark(solid, remark):
+    """2 kg m^2 of 2 kg: a radius of gyration of 1 m."""
+    shape = f"<visual><geometry>{solid}</geometry></visual></link>" if solid else "</link>"
+    text = ARM.replace("</link>", shape, 1).replace('"0.02"', '"2"')
+    found = [one for one in parse_urdf(text).remarks if one.startswith("radius of gyration")]
+    assert [one.startswith(remark) for one in found] == ([True] if remark else [])

@@ -17,6 +17,18 @@ ARM = """<?xml version="1.0"?>
 </robot>
 """
 
+GRIP = """<?xml version="1.0"?>
+<robot name="gripping">
+  <link name="torso"/><link name="hip"/><link name="f1"/><link name="f2"/>
+  <joint name="hip" type="revolute"><parent link="torso"/><child link="hip"/><axis xyz="0 1 0"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+  <joint name="f1" type="revolute"><origin xyz="0 0.02 -0.1"/><parent link="hip"/><child link="f1"/>
+    <axis xyz="1 0 0"/><limit lower="0" upper="0.8" effort="1" velocity="1"/></joint>
+  <joint name="f2" type="continuous"><origin xyz="0 -0.02 -0.1"/><parent link="hip"/><child link="f2"/>
+    <axis xyz="1 0 0"/><mimic joint="f1" multiplier="-1" offset="0"/></joint>
+</robot>
+"""
+
 
 def random_urdf(rng: np.random.Generator, links: int = 9) -> str:
     """A tree with turned origins, turned inertias, slanted axes of any length, and fixed joints."""

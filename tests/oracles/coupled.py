@@ -132,7 +132,7 @@ class Oracle:
             "mass": G.T @ M[np.ix_(self.at, self.at)] @ G,
             "efforts": G.T @ tau[self.at],
         }
-        if base:
+        if base and self.robot.mass:
             f, moment = R @ tau[base[:3]], R @ tau[base[3:]]
             h = pin.computeCentroidalMomentum(model, data, Q, v)
             result |= {
@@ -152,7 +152,7 @@ class Oracle:
             "mass": sk.mass_matrix(robot, s)[6:, 6:],
             "efforts": sk.inverse_dynamics(robot, s, m.qd, m.qdd, m.base, m.base_rate)[6:],
         }
-        if self.root:
+        if self.root and robot.mass:
             result |= {
                 "com": sk.center_of_mass(robot, s),
                 "com_jacobian": sk.com_jacobian(robot, s)[:, 6:],

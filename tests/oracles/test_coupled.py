@@ -14,6 +14,7 @@ from screwkin.algebra.se3 import as_array, map_scalars
 from screwkin.kinematics.positions import link_displacements
 from screwkin.model.urdf import urdf_from_robot
 from screwkin.model.urdf_in import load_urdf, parse_urdf
+from tests.model.urdf_texts import GRIP
 from tests.oracles.coupled import Oracle, coupled_tree, tangled_tree
 
 
@@ -34,6 +35,17 @@ def test_joints_that_follow_any_other_agree_with_free_joints_and_the_chain_rule(
     robot = parse_urdf(text).robot
     assert robot.coupled
     Oracle(text, robot, mimic=False).check(rng)
+
+
+def test_fingers_of_two_kinds_of_joints_close_against_each_other():
+    """Pinocchio takes the file as this library writes it: one kind of joint for leader and follower."""
+    robot = parse_urdf(GRIP).robot
+    assert [(joint.name, joint.leader, joint.ratio, joint.offset) for joint in robot.coupled] == [
+        ("f2", "f1", -1, 0)
+    ]
+    rng = np.random.default_rng(0)
+    Oracle(GRIP, robot, mimic=False).check(rng)
+    Oracle(urdf_from_robot(robot), robot, mimic=True).check(rng)
 
 
 def test_jax_and_symbols_couple_joints_as_numpy_does():

@@ -1,0 +1,176 @@
+"""python -m benchmarks.robots FILE|FOLDER... [--rows FILE] [--page FILE]: public robots, unedited.
+
+Every URDF is read, its limbs, soles and home are found, a gait is fitted to it, and six steps are walked and
+validated in both engines with rigid servos, as ``screwkin walk --auto`` and ``screwkin validate`` do. Each
+row is appended to ``robots.jsonl`` (or --rows) at once; files that stand there are not tried again. --page
+writes the table of all rows as Markdown.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import screwkin as sk
+from benchmarks.environments import ROOT
+from benchmarks.machine import pin_threads
+from screwkin.analysis.engines import Engine
+from screwkin.anatomy.humanoid import anatomy
+from screwkin.gait.realise import free_rotations
+from screwkin.ik.closed import recognised
+from screwkin.kinematics.serial_chain import SerialChain
+from screwkin.mechanism.choice import closed_mechanism
+
+STEPS = 6
+POSES = 20
+"""Random poses of a leg within its limits, made by its own forward kinematics."""
+ENGINES: tuple[Engine, ...] = ("mujoco", "pybullet")
+Row = dict[str, Any]
+
+
+def files_of(places: Sequence[Path]) -> Iterator[Path]:
+    """URDF files given, and those in folders."""
+    for place in places:
+        if place.is_file():
+            yield place
+        else:
+            yield from sorted(p for p in place.rglob("*") if p.suffix.lower() == ".urdf")
+
+
+def row_of(path: Path) -> Row:
+    """What becomes of one file; the first refusal ends the row."""
+    row: Row = {"file": f"{path.parent.parent.name}/{path.name}", "path": str(path)}
+    try:
+        for part in (_body, _gait):
+            part(path, row)
+    except sk.ScrewkinError as error:
+        row["reason"] = str(error).splitlines()[0]
+    except Exception as error:  # a fault of the program is a row too, and not the end of a campaign
+        row["reason"] = f"unexpected {type(error).__name__}: {error}"
+    row.pop("robot", None)
+    return row
+
+
+def _body(path: Path, row: Row) -> None:
+    robot = sk.load_robot(path)
+    row |= {"name": robot.name, "mass": float(robot.mass), "joints": len(robot.joints)}
+    start = time.process_time()
+    found = anatomy(robot)
+    row["anatomy_s"] = time.process_time() - start
+    robot = row["robot"] = found.robot
+    row["confidence"] = found.confidence
+    row["limbs"] = {limb.name: len(robot.path_to(limb.link)) for limb in robot.limbs}
+    row["ik"], row["solved"] = _leg(robot)
+
+
+def _leg(robot: sk.Robot) -> tuple[str, float]:
+    """Class of a leg's inverse kinematics, and the share of its own poses that is solved within limits."""
+    limb = next(limb for limb in robot.limbs if limb.kind == "leg")
+    free = free_rotations(closed_mechanism(robot)).get(limb.tip, ())
+    form = recognised(SerialChain.of(robot, limb.name, free))
+    rng, joints = np.random.default_rng(1), list(robot.path_to(limb.link))
+    low, high = (np.array([getattr(robot.joints[i], key) for i in joints]) for key in ("lower", "upper"))
+    q = np.tile(sk.home(robot).q, (POSES, 1))
+    q[:, joints] = rng.uniform(np.maximum(low, -np.pi), np.minimum(high, np.pi), (POSES, len(joints)))
+    state = sk.State(np.tile(np.eye(4), (POSES, 1, 1)), q)
+    targets = {limb.tip: sk.frame_pose(robot, state, limb.tip)}
+    solution = sk.solve_pose(robot, targets, sk.State(np.eye(4), sk.home(robot).q), free={limb.tip: free})
+    return form.family if form else "numeric", float((solution.status == 0).mean())
+
+
+def _gait(path: Path, row: Row) -> None:
+    robot = row["robot"]
+    start = time.process_time()
+    gait = sk.fitting_gait(robot)
+    row["fitting_s"] = time.process_time() - start
+    numbers = {key: gait.numbers[key] for key in ("Tc", "stride", "lift", "waist_height", "bend", "period")}
+    row["gait"] = numbers
+    trajectory = sk.walk(robot, gait, STEPS)
+    row["margin_mm"] = 1e3 * float(trajectory.margin.min())
+    row["verdicts"] = {}
+    for engine in ENGINES:
+        check = sk.validate(robot, trajectory, engine=engine)
+        row["verdicts"][engine] = {"passed": check.passed, "reasons": list(check.reasons)}
+
+
+def page_of(rows: Sequence[Row]) -> str:
+    """The table of all rows."""
+    walked = [row for row in rows if passed(row)]
+    lines = [
+        "# Public robots, unedited",
+        "",
+        "Written by `python -m benchmarks.robots FOLDER... --page docs/robots.md`: every URDF as its authors",
+        f"publish it; limbs, soles and home found, a gait fitted, {STEPS} steps, `validate` with defaults",
+        "on rigid servos. Anatomy: processor time of limbs, soles and home.",
+        "Solved: the share of a leg's own random poses within limits that inverse kinematics finds again.",
+        "",
+        f"{len(walked)} of {len(rows)} files walk in both engines.",
+        "",
+        "| robot | joints | legs, arms | leg IK | solved | anatomy | gait | MuJoCo | PyBullet |",
+        "|---|---|---|---|---|---|---|---|---|",
+        *(_line(row) for row in sorted(rows, key=lambda row: (not passed(row), row["file"].lower()))),
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def passed(row: Mapping[str, Any]) -> bool:
+    """Whether a robot walks in both engines."""
+    verdicts = row.get("verdicts", {})
+    return len(verdicts) == len(ENGINES) and all(verdict["passed"] for verdict in verdicts.values())
+
+
+def _line(row: Row) -> str:
+    limbs = row.get("limbs", {})
+    legs, arms = (
+        "+".join(str(count) for name, count in limbs.items() if name.endswith(kind)) or "-"
+        for kind in ("leg", "arm")
+    )
+    solved = f"{100 * row['solved']:.0f} %" if "solved" in row else ""
+    anatomy_s = f"{row['anatomy_s']:.1f} s" if "anatomy_s" in row else ""
+    gait = row.get("gait")
+    gait_text = f"{gait['stride']:.3f} m in {gait['Tc']:.2f} s" if gait else ""
+    reason = row.get("reason", "").replace("|", "/")
+    verdicts = row.get("verdicts", {})
+    cells = [
+        "walks" if verdicts[e]["passed"] else "; ".join(verdicts[e]["reasons"]) if e in verdicts else reason
+        for e in ENGINES
+        if e in verdicts
+    ] or [reason, ""]
+    start = [row["file"], str(row.get("joints", "")), f"{legs}, {arms}", row.get("ik", ""), solved]
+    return "| " + " | ".join([*start, anatomy_s, gait_text, *cells]) + " |"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("places", nargs="*", type=Path)
+    parser.add_argument("--rows", type=Path, default=ROOT / "robots.jsonl")
+    parser.add_argument("--page", type=Path)
+    asked = parser.parse_args()
+    pin_threads()
+    warnings.simplefilter("ignore")
+    done = {row["path"]: row for row in _read(asked.rows)}
+    for path in files_of(asked.places):
+        if str(path) not in done:
+            row = done[str(path)] = row_of(path)
+            with asked.rows.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(row) + "\n")
+            print(_line(row), flush=True)
+    if asked.page:
+        asked.page.write_text(page_of(list(done.values())), encoding="utf-8")
+
+
+def _read(path: Path) -> list[Row]:
+    lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
+    return [json.loads(line) for line in lines]
+
+
+if __name__ == "__main__":
+    main()

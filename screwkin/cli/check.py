@@ -1,0 +1,56 @@
+"""``screwkin check``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from screwkin.analysis.audit import added_by_pybullet, audit
+from screwkin.analysis.remark import LEVELS, Remark
+from screwkin.anatomy.humanoid import anatomy
+from screwkin.cli.options import AsJson, RobotName
+from screwkin.cli.output import print_json
+from screwkin.errors import ScrewkinError, TableError
+from screwkin.model.robot import Robot
+from screwkin.model.table import load_robot
+from screwkin.model.toml import read_text
+from screwkin.model.urdf_xml import links_without_inertia
+
+_NO = 3
+_ADVICE = "screwkin new writes the table with it, to be edited"
+
+
+def check(robot: RobotName, as_json: AsJson = False) -> int:
+    """Audit a robot: masses, inertias, limits, axes, symmetry, soles, loops, and what simulators change.
+
+    Exit code 3 if a remark is an error: dynamics or walks of such a robot cannot be believed.
+    """
+    table = load_robot(robot)
+    remarks = _remarks(table)
+    counts = {level: sum(remark.level == level for remark in remarks) for level in LEVELS}
+    if as_json:
+        found = [remark.to_dict() for remark in remarks]
+        print_json({"robot": table.name, "remarks": found, "counts": counts, "passed": not counts["error"]})
+    else:
+        for remark in remarks:
+            print(remark)
+        print(f"{table.name}: " + ", ".join(f"{count} of level {level}" for level, count in counts.items()))
+    return _NO if counts["error"] else 0
+
+
+def _remarks(robot: Robot) -> tuple[Remark, ...]:
+    """Those of the robot, with its limbs if they can be found, and of what tables do not have of its URDF."""
+    more = []
+    path = Path(robot.path)
+    if path.suffix.lower() == ".urdf" and path.is_file():
+        massless = links_without_inertia(read_text(path, TableError), str(path))
+        if added := added_by_pybullet(massless, float(robot.mass)):
+            more.append(added)
+    if not robot.limbs and robot.base == "floating":
+        try:
+            found = anatomy(robot)
+            robot = found.robot
+            more += [Remark("info", "anatomy", str(finding), _ADVICE) for finding in found.findings]
+            more += [Remark("info", "anatomy", text, _ADVICE) for text in found.remarks]
+        except ScrewkinError as error:
+            more.append(Remark("info", "anatomy", str(error), "No walk without limbs, soles and home"))
+    return tuple(sorted((*more, *audit(robot)), key=lambda remark: LEVELS.index(remark.level)))

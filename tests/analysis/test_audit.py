@@ -1,0 +1,122 @@
+"""The audit of a robot: every damage is named with place, level and advice; sound robots have no errors."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+import screwkin as sk
+from screwkin.analysis.audit import added_by_pybullet, audit
+from screwkin.cli import run
+from screwkin.model.robot import Inertia, Robot
+
+NAMES = [name for name in sk.robot_names() if "/" not in name]
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return sk.load_robot("bioloid")
+
+
+def with_link(robot: Robot, name: str, **changes) -> Robot:
+    links = tuple(replace(link, **changes) if link.name == name else link for link in robot.links)
+    return replace(robot, links=links)
+
+
+def with_joint(robot: Robot, name: str, **changes) -> Robot:
+    joints = tuple(replace(joint, **changes) if joint.name == name else joint for joint in robot.joints)
+    return replace(robot, joints=joints)
+
+
+def remarks_at(robot: Robot, place: str) -> str:
+    return " ".join(str(remark) for remark in audit(robot) if remark.place == place)
+
+
+@pytest.mark.parametrize("name", [*NAMES, "linkages/four-bar", "linkages/stewart"])
+def test_bundled_robots_have_no_errors_and_no_warnings(name):
+    assert [str(remark) for remark in audit(sk.load_robot(name)) if remark.level != "info"] == []
+
+
+def test_a_com_or_an_inertia_in_millimetres_is_seen(robot):
+    thigh = robot.link("right_thigh")
+    far = with_link(robot, "right_thigh", com=thigh.com * 1000)
+    assert "CoM lies" in remarks_at(far, "link right_thigh")
+    i = thigh.inertia
+    large = with_link(robot, "right_thigh", inertia=Inertia(i.xx * 1e6, i.yy * 1e6, i.zz * 1e6))
+    assert "warning" in remarks_at(large, "link right_thigh")
+    assert "radius of gyration" in remarks_at(large, "link right_thigh")
+
+
+def test_impossible_and_absent_inertias_are_warnings(robot):
+    broken = with_link(robot, "torso", inertia=Inertia(1e-3, 1e-3, 3e-3))
+    assert "triangle inequality" in remarks_at(broken, "link torso")
+    none = with_link(robot, "torso", inertia=Inertia(0, 0, 0))
+    assert "no moment of inertia" in remarks_at(none, "link torso")
+
+
+def test_a_robot_without_mass_is_an_error(robot):
+    weightless = replace(
+        robot, links=tuple(replace(link, mass=0.0, inertia=Inertia(0, 0, 0)) for link in robot.links)
+    )
+    assert audit(weightless)[0].level == "error"
+    assert audit(weightless)[0].place == "masses"
+
+
+def test_a_joint_without_range_is_named(robot):
+    at = robot.posture("home").q[robot.joint_names.index("right_elbow")]
+    stiff = replace(
+        with_joint(replace(robot, postures=(robot.posture("home"),)), "right_elbow", lower=at, upper=at)
+    )
+    assert "no range" in remarks_at(stiff, "joint right_elbow")
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"lower": -float("inf"), "upper": float("inf")}, "no limits"),
+        ({"velocity": 500.0}, "speed is 500"),
+        ({"effort": 1e6}, "effort is 1e+06"),
+        ({"effort": float("inf")}, "no effort is given"),
+    ],
+)
+def test_doubtful_limits_are_named(robot, changes, said):
+    assert said in remarks_at(with_joint(robot, "right_elbow", **changes), "joint right_elbow")
+
+
+def test_left_and_right_that_differ_are_named(robot):
+    heavier = with_link(robot, "left_calf", mass=2 * robot.link("left_calf").mass)
+    assert any("left_calf" in remark.place and "mass" in remark.what for remark in audit(heavier))
+    weaker = with_joint(robot, "left_knee", effort=0.5)
+    assert any("left_knee" in remark.place and "effort" in remark.what for remark in audit(weaker))
+
+
+def test_a_missing_sole_is_an_error_and_a_stand_on_unequal_heights_a_warning(robot):
+    bare = replace(robot, soles=robot.soles[:1])
+    assert any(remark.level == "error" and remark.what == "missing" for remark in audit(bare))
+    home = robot.posture("home")
+    q = list(home.q)
+    q[robot.joint_names.index("left_knee")] += 0.3
+    crooked = replace(robot, postures=(replace(home, q=tuple(q)),))
+    assert "leans by" in remarks_at(crooked, f"sole {robot.limb('left_foot').name}")
+    assert "heights at home differ" in remarks_at(crooked, "soles")
+
+
+def test_the_mass_that_pybullet_adds_is_said_in_kilograms():
+    assert "40.53 -> 66.53 kg" in added_by_pybullet(26, 40.53).what
+    assert added_by_pybullet(0, 1.0) is None
+
+
+def test_the_verb_prints_remarks_and_leaves_with_3_for_an_error(tmp_path, capsys, robot):
+    assert run(["check", "bioloid", "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["passed"]
+    assert {"level", "place", "what", "advice"} == {*data["remarks"][0]}
+    text = "\n".join(
+        line for line in robot.text.splitlines() if not line.startswith(("mass =", "com =", "inertia ="))
+    ).replace("[[link]]", "[[link]]\nmass = 0")
+    path = tmp_path / "light.toml"
+    path.write_text(text)
+    assert run(["check", str(path)]) == 3
+    assert "error: masses: no link has a mass" in capsys.readouterr().out

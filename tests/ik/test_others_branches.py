@@ -1,0 +1,135 @@
+"""EAIK as judge: every branch that it finds is found."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import screwkin as sk
+from screwkin.algebra.screws import Screw
+from screwkin.algebra.se3 import Vector, as_array, pose_from_array, unstack
+from screwkin.analysis.ik_others import offset_parameters
+from screwkin.ik.methods import solve_limb_arrays
+from screwkin.ik.numeric import IkSettings
+from screwkin.kinematics.serial_chain import SerialChain, distance, forward, nearest_points, residual
+from tests.ik.legs import (
+    Leg,
+    apart,
+    backwards,
+    offset_leg,
+    random_parallel_leg,
+    random_spherical_leg,
+    spherical_leg,
+)
+
+SAME, EXACT, REGULAR = 1e-5, 1e-7, 1e-3
+
+
+def assert_all_of_eaik_s_branches_are_found(chain: SerialChain, poses: int) -> int:
+    """How many were compared: solutions of EAIK's, singular ones apart, whose digits are few."""
+    library = pytest.importorskip("eaik.IK_HP")
+    other = library.HPRobot(*offset_parameters(chain))
+    if not other.hasKnownDecomposition():
+        return 0
+    low, high = (np.where(np.isfinite(x), x, y) for x, y in ((chain.lower, -np.pi), (chain.upper, np.pi)))
+    q = np.random.default_rng(0).uniform(low, high, (poses, 6))
+    T = poses_of(chain, q)
+    home = poses_of(chain, np.zeros((1, 6)))[0, :3, :3]
+    found, compared = solve_limb_arrays(chain, T, "auto", np.zeros(6), IkSettings(), True), 0
+    for k, pose in enumerate(T):
+        wanted = pose.copy()
+        wanted[:3, :3] = pose[:3, :3] @ home.T
+        answer = other.IK(wanted)
+        theirs = [np.asarray(x) for x, least in zip(answer.Q, answer.is_LS, strict=True) if not least]
+        for x in theirs:
+            if distance(chain, x[None], pose[None])[0] > EXACT or conditioning(chain, x) < REGULAR:
+                continue
+            near = apart(found.q[k], x) < SAME
+            assert (near & found.valid[k]).any(), (chain.limb, k, x)
+            compared += 1
+    return compared
+
+
+def poses_of(chain: SerialChain, q: np.ndarray) -> np.ndarray:
+    return np.asarray(as_array(forward(chain.screws, unstack(q), chain.tip)[0], (len(q),)), dtype=float)
+
+
+def conditioning(chain: SerialChain, q: np.ndarray) -> float:
+    J = residual(chain, q[None], poses_of(chain, q[None]))[1][0]
+    J[3:] /= chain.length
+    values = np.linalg.svd(J, compute_uv=False)
+    return float(values[-1] / values[0])
+
+
+@pytest.mark.parametrize(
+    "leg",
+    [offset_leg(), spherical_leg(), random_parallel_leg(0), random_spherical_leg(1)],
+)
+def test_branches_of_special_legs(leg: Leg) -> None:
+    assert assert_all_of_eaik_s_branches_are_found(leg.chain(), 8) > 8
+    assert assert_all_of_eaik_s_branches_are_found(backwards(leg, 1).chain(), 8) > 8
+
+
+@pytest.mark.parametrize("name", ["bioloid", "poppy12"])
+def test_branches_of_bundled_legs(name: str) -> None:
+    robot = sk.load_robot(name)
+    for limb in robot.limbs:
+        if limb.kind == "leg":
+            assert assert_all_of_eaik_s_branches_are_found(SerialChain.of(robot, limb.name), 8) > 8
+
+
+def chains_of(folder: Path) -> Iterator[SerialChain]:
+    """The last six revolute joints above every leaf of every URDF file, by Pinocchio."""
+    pin = pytest.importorskip("pinocchio")
+    for file in sorted(folder.glob("*/*/*.urdf")):
+        try:
+            model = pin.buildModelFromUrdf(str(file))
+        except (ValueError, RuntimeError):  # what Pinocchio does not read is no limb
+            continue
+        data = model.createData()
+        pin.computeJointJacobians(model, data, pin.neutral(model))
+        for leaf in range(1, model.njoints):
+            path = list(model.supports[leaf])[1:][-6:]
+            single = all(model.joints[j].nv == 1 and "R" in model.joints[j].shortname() for j in path)
+            if len(model.children[leaf]) or len(path) < 6 or not single:
+                continue
+            screws = []
+            for j in path:
+                J = pin.getJointJacobian(model, data, j, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+                axis = J[3:, model.joints[j].idx_v]
+                screws.append(Screw(Vector(*map(float, axis)), Vector(*map(float, data.oMi[j].translation))))
+            yield chain_of(screws, f"{file.stem} {model.names[leaf]}")
+
+
+def chain_of(screws: list[Screw], name: str) -> SerialChain:
+    points = np.array([list(screw.s0) for screw in screws])
+    tip = np.eye(4)
+    tip[:3, 3] = points[-1] + [0.02, 0.01, -0.05]
+    near = nearest_points(screws, pose_from_array(tip).p)
+    size = np.linalg.norm(np.diff([list(screw.s0) for screw in near], axis=0), axis=1).sum()
+    names, ends = tuple(f"{name} {k}" for k in range(6)), np.full(6, np.pi)
+    turning, length = np.ones(6, dtype=bool), float(size) + 0.05
+    return SerialChain(name, names, tuple(range(6)), near, pose_from_array(tip), -ends, ends, turning, length)
+
+
+@pytest.mark.robots
+def test_branches_of_public_robots() -> None:
+    chains, seen, compared = chains_of(robots_folder()), set(), 0
+    for chain in chains:
+        key = np.round([[*s.s, *(s.s0 - chain.tip.p)] for s in chain.screws], 6).tobytes()
+        if key not in seen:
+            seen.add(key)
+            compared += assert_all_of_eaik_s_branches_are_found(chain, 10)
+    assert compared > 100
+
+
+def robots_folder() -> Path:
+    given = os.environ.get("SCREWKIN_ROBOTS")
+    if given:
+        return Path(given)
+    data = pytest.importorskip("example_robot_data")
+    return Path(data.__file__).parents[4] / "share" / "example-robot-data" / "robots"
