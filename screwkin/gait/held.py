@@ -12,6 +12,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.screws import carry, displacement
 from screwkin.algebra.se3 import IDENTITY, Pose, Vector, as_array
 from screwkin.errors import InputError
+from screwkin.model.records import Frame
 from screwkin.model.robot import Inertia, Joint, Limb, Link, Robot, Sole
 
 Kind = TypeVar("Kind", bound=Joint)
@@ -22,7 +23,8 @@ def with_held_joints(robot: Robot, positions: Mapping[str, float]) -> Robot:
 
     The zero pose of what is left is the one in which the held joints stand where they are held, so joint
     positions, tips and the motion of every body stay what they are. Joints coupled to held ones are held
-    too. Boxes, which contact alone needs, and the table's text are left out.
+    too. Boxes and shapes, which contact and pictures need, and the table's text are left
+    out.
 
     Args:
         robot: without closures.
@@ -53,6 +55,9 @@ def with_held_joints(robot: Robot, positions: Mapping[str, float]) -> Robot:
     def limb_of(limb: Limb) -> Limb:
         return replace(limb, link=body[limb.link], frame=moved[limb.link] @ limb.frame)
 
+    def place_of(place: Frame) -> Frame:
+        return replace(place, link=body[place.link], pose=moved[place.link] @ place.pose)
+
     def sole_of(sole: Sole) -> Sole:
         T = moved[robot.limb(sole.limb).link]
         return replace(sole, corners=tuple(T @ corner for corner in sole.corners))
@@ -65,6 +70,7 @@ def with_held_joints(robot: Robot, positions: Mapping[str, float]) -> Robot:
         coupled=tuple(joint_of(joint) for joint in robot.coupled if joint.name not in held),
         limbs=tuple(map(limb_of, robot.limbs)),
         soles=tuple(map(sole_of, robot.soles)),
+        frames=tuple(map(place_of, robot.frames)),
         postures=tuple(replace(p, q=tuple(p.q[i] for i in left)) for p in robot.postures),
         text="",
     )
@@ -74,9 +80,10 @@ def _body(robot: Robot, name: str, body: Mapping[str, str], moved: Mapping[str, 
     """A link together with all that is held to it."""
     parts = [link for link in robot.links if body[link.name] == name]
     own = robot.link(name)
-    frame, mass = moved[name] @ own.frame, float(sum(part.mass for part in parts))
+    bare = replace(own, frame=moved[name] @ own.frame, boxes=(), shapes=())
+    mass = float(sum(part.mass for part in parts))
     if mass == 0:
-        return replace(own, com=moved[name] @ own.com, frame=frame, boxes=())
+        return replace(bare, com=moved[name] @ own.com)
     masses = [float(part.mass) for part in parts]
     places = [as_array(moved[part.name] @ part.com).astype(float) for part in parts]
     com = np.average(places, axis=0, weights=masses)
@@ -86,7 +93,7 @@ def _body(robot: Robot, name: str, body: Mapping[str, str], moved: Mapping[str, 
         total += R @ _matrix(part.inertia) @ R.T + m * (arm @ arm * np.eye(3) - np.outer(arm, arm))
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = total.tolist()
     inertia = Inertia(xx, yy, zz, xy, xz, yz)
-    return replace(own, mass=mass, com=Vector(*com.tolist()), inertia=inertia, frame=frame, boxes=())
+    return replace(bare, mass=mass, com=Vector(*com.tolist()), inertia=inertia)
 
 
 def _matrix(i: Inertia) -> Array:

@@ -14,6 +14,7 @@ from screwkin.algebra.se3 import UNTURNED, Pose, Vector
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.gait.driven import driven
 from screwkin.gait.held import with_held_joints
+from screwkin.model.records import Frame
 from screwkin.model.robot import Inertia, Link, Robot
 from screwkin.model.table import parse_robot
 from tests.cases.tables import NECK, WAIST_JOINT
@@ -47,12 +48,14 @@ def with_arm_yaw(robot: Robot) -> Robot:
 @pytest.mark.parametrize("name", ["bioloid", "bioloid24"])
 def test_bodies_of_a_robot_with_held_joints_are_where_they_are_without_holding(name: str) -> None:
     robot = sk.load_robot(name)
+    places = tuple(Frame(f"on_{link.name}", link.name, link.frame) for link in robot.links)
+    robot = replace(robot, frames=places)
     rng = np.random.default_rng(1)
     q, names = rng.uniform(-1, 1, len(robot.joints)), ("right_hip_pitch", "left_elbow", "right_shoulder_roll")
     less = with_held_joints(robot, {n: q[robot.joint_names.index(n)] for n in names})
     left = [i for i, n in enumerate(robot.joint_names) if n not in names]
     one, two = sk.State(np.eye(4), q), sk.State(np.eye(4), q[left])
-    for frame in (*robot.tip_names, *less.link_names):
+    for frame in (*robot.tip_names, *less.link_names, *(place.name for place in places)):
         np.testing.assert_allclose(
             sk.frame_pose(less, two, frame), sk.frame_pose(robot, one, frame), atol=1e-14
         )
