@@ -16,7 +16,7 @@ from screwkin.ik.closed import EXACT, first_of_its_kind
 from screwkin.ik.eliminated import eliminated, elimination, elimination_programs, exact
 from screwkin.ik.elimination import BRANCHES
 from screwkin.ik.on_limits import on_limits
-from screwkin.ik.polish import iterated, steps
+from screwkin.ik.polish import from_guess, iterated, steps
 from screwkin.ik.relative import relative
 from screwkin.ik.solutions import LimbSolutions, ordered
 from screwkin.kinematics.serial_chain import SerialChain, cached, residual
@@ -53,6 +53,7 @@ def branch_solutions(
     """
     q, error = _near_relative(chain, target) if by_relative(chain) else eliminated(chain, target)
     iterated(chain, q, error, target)
+    from_guess(chain, q, error, target, guess)
     q = chain.wrapped(q)
     if max(tolerances) > LIMIT_TOLERANCE:
         owner, k = (error <= EXACT).nonzero()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.scalar import Scalar, larger, least, where
 from screwkin.algebra.screws import at
@@ -68,7 +70,35 @@ def iterated(chain: SerialChain, q: Array, error: Array, target: Array) -> None:
         error: of them (B, k) [m and rad, norm].
         target: exact poses of the tip (B, 4, 4).
     """
-    owner, k = ((error > ROUGH) & (error < NEAR)).nonzero()
+    _repeated(chain, q, error, target, (error > ROUGH) & (error < NEAR))
+
+
+def from_guess(chain: SerialChain, q: Array, error: Array, target: Array, guess: Array) -> None:
+    """Where none of the branches is within limits, put the one that Newton steps reach from a guess there.
+
+    Elimination misses branches that share the angle of the given joint, as all do that hold a limb in a plane
+    of symmetry.
+
+    Args:
+        chain: of six joints.
+        q: branches (B, k, 6), changed in place where one is absent.
+        error: of them (B, k) [m and rad, norm], changed too.
+        target: exact poses of the tip (B, 4, 4).
+        guess: (B, 6).
+    """
+    turned = chain.wrapped(q)
+    inside = ((turned >= chain.lower) & (turned <= chain.upper)).all(axis=2)
+    sample, k = np.arange(len(q)), error.argmax(axis=1)
+    lost = ~((error <= ROUGH) & inside).any(axis=1) & (error[sample, k] > ROUGH)
+    q[sample[lost], k[lost]], error[sample[lost], k[lost]] = guess[lost], np.inf
+    chosen = np.zeros(error.shape, dtype=bool)
+    chosen[sample[lost], k[lost]] = True
+    _repeated(chain, q, error, target, chosen)
+
+
+def _repeated(chain: SerialChain, q: Array, error: Array, target: Array, chosen: Array) -> None:
+    """Newton steps of chosen branches (B, k), as long as they help."""
+    owner, k = chosen.nonzero()
     for _ in range(ROUNDS):
         out = run(steps(chain), {"start": q[owner, k], "target": target[owner]})
         better = out["error"][:, 0] < error[owner, k]

@@ -99,6 +99,26 @@ def test_the_own_branch_is_found_and_every_branch_is_a_solution(name: str) -> No
     assert_own_branch(LEGS[name], 150, 0.99)
 
 
+def upright_pairs_leg() -> Leg:
+    """Pitch, roll and yaw in pairs, the yaw 12 mm ahead, a knee parallel to a universal ankle's pitch."""
+    axes = [[0, 1, 0], [1, 0, 0], [0, 0, 1], [0, 1, 0], [0, 1, 0], [1, 0, 0]]
+    points = [[0, 0, -0.077], [0, 0, -0.103], [0.012, 0, -0.1515], [-0.002, 0, -0.2685]]
+    points += [[-0.0018, 0.0002, -0.51369], [-0.0018, 0.0002, -0.51369]]
+    tip = np.eye(4)
+    tip[:3, 3] = [0, 0, -0.55]
+    return Leg(np.array(axes, dtype=float), np.array(points, dtype=float), tip)
+
+
+def test_a_leg_in_its_plane_of_symmetry_is_solved_near_the_guess() -> None:
+    """There all branches share angles of roll and yaw, so that elimination misses some."""
+    leg, rng = upright_pairs_leg(), np.random.default_rng(0)
+    home = np.array([-0.45, 0, 0, 0.8, -0.35, 0])
+    q = home + rng.uniform(-0.3, 0.3, (200, 6)) * [1, 0, 0, 1, 1, 0]
+    found = solved(limited(leg), leg.reach(q), home)
+    assert found.in_limits[:, 0].all()
+    assert apart(found.q[:, 0], q).max() < 1e-6
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", LEGS)
 def test_the_own_branch_is_found_in_thousands_of_poses(name: str) -> None:
