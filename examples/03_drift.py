@@ -10,7 +10,7 @@ import numpy as np
 
 import screwkin as sk
 from screwkin.gait.plan import plan
-from screwkin.gait.walk import stance_of
+from screwkin.gait.stance import stance_of
 
 STEP = 0.02  # integration step [s]
 
