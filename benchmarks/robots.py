@@ -24,6 +24,7 @@ from benchmarks.machine import pin_threads
 from screwkin.analysis.engines import Engine
 from screwkin.anatomy.humanoid import anatomy
 from screwkin.gait.realise import free_rotations
+from screwkin.ik.all_branches import has_branches
 from screwkin.ik.closed import recognised
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.choice import closed_mechanism
@@ -74,7 +75,8 @@ def _leg(robot: sk.Robot) -> tuple[str, float]:
     """Class of a leg's inverse kinematics, and the share of its own poses that is solved within limits."""
     limb = next(limb for limb in robot.limbs if limb.kind == "leg")
     free = free_rotations(closed_mechanism(robot)).get(limb.tip, ())
-    form = recognised(SerialChain.of(robot, limb.name, free))
+    chain = SerialChain.of(robot, limb.name, free)
+    form = recognised(chain)
     rng, joints = np.random.default_rng(1), list(robot.path_to(limb.link))
     low, high = (np.array([getattr(robot.joints[i], key) for i in joints]) for key in ("lower", "upper"))
     q = np.tile(sk.home(robot).q, (POSES, 1))
@@ -82,7 +84,8 @@ def _leg(robot: sk.Robot) -> tuple[str, float]:
     state = sk.State(np.tile(np.eye(4), (POSES, 1, 1)), q)
     targets = {limb.tip: sk.frame_pose(robot, state, limb.tip)}
     solution = sk.solve_pose(robot, targets, sk.State(np.eye(4), sk.home(robot).q), free={limb.tip: free})
-    return form.family if form else "numeric", float((solution.status == 0).mean())
+    family = form.family if form else "branches" if has_branches(chain) else "numeric"
+    return family, float((solution.status == 0).mean())
 
 
 def _gait(path: Path, row: Row) -> None:

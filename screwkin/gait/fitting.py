@@ -39,10 +39,11 @@ _SPREAD = 2.0  # leg lengths: radii of gyration beyond it are in other units
 
 @dataclass(frozen=True)
 class _Judged:
-    """A gait planned in full and why it will not do; empty if it does."""
+    """A gait planned in full and why it will not do, empty if it does; cut short: there is no such walk."""
 
     gait: Gait
     reasons: tuple[str, ...]
+    cut_short: bool = False
 
 
 def fitting_gait(robot: Robot) -> Gait:
@@ -97,7 +98,7 @@ def _judged(robot: Robot, gait: Gait) -> _Judged:
     try:
         trajectory = planned_walk(robot, gait, _STEPS)
     except ScrewkinError as error:
-        return _Judged(gait, (str(error),))
+        return _Judged(gait, (str(error),), cut_short=True)
     return _Judged(gait, (*_unbalanced(trajectory), *_overloaded(robot, trajectory)))
 
 
@@ -122,7 +123,7 @@ def _overloaded(robot: Robot, trajectory: Trajectory) -> Iterator[str]:
 def _refusal(robot: Robot, base: Gait, tried: Sequence[_Judged]) -> str:
     """Why no gait was found: what the one that failed least asks too much of, or how the first ended."""
     if tried:
-        best = min(tried, key=lambda judged: len(judged.reasons))
+        best = min(tried, key=lambda judged: (judged.cut_short, len(judged.reasons)))
         size = f"stride {best.gait.stride:.3g} m, Tc {best.gait.Tc:.3g} s"
         return f"{robot.name}: no gait fits; with {size}: {'; '.join(best.reasons)}{_spread(robot, base)}"
     stride, lift, _ = TRIES[-1]
