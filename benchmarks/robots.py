@@ -47,7 +47,7 @@ def files_of(places: Sequence[Path]) -> Iterator[Path]:
 
 def row_of(path: Path) -> Row:
     """What becomes of one file; the first refusal ends the row."""
-    row: Row = {"file": f"{path.parent.parent.name}/{path.name}", "path": str(path)}
+    row: Row = {"file": "/".join(path.parts[-3:]), "path": str(path)}
     try:
         for part in (_body, _gait):
             part(path, row)
