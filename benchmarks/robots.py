@@ -23,6 +23,7 @@ from benchmarks.environments import ROOT
 from benchmarks.machine import pin_threads
 from screwkin.analysis.engines import Engine
 from screwkin.anatomy.humanoid import anatomy
+from screwkin.gait.driven import arms_of, driven
 from screwkin.gait.realise import free_rotations
 from screwkin.ik.all_branches import has_branches
 from screwkin.ik.closed import recognised
@@ -71,8 +72,9 @@ def _body(path: Path, row: Row) -> None:
     row["ik"], row["solved"] = _leg(robot)
 
 
-def _leg(robot: sk.Robot) -> tuple[str, float]:
+def _leg(whole: sk.Robot) -> tuple[str, float]:
     """Class of a leg's inverse kinematics, and the share of its own poses that is solved within limits."""
+    robot = driven(whole, arms_of(whole)).moving
     limb = next(limb for limb in robot.limbs if limb.kind == "leg")
     free = free_rotations(closed_mechanism(robot)).get(limb.tip, ())
     chain = SerialChain.of(robot, limb.name, free)
