@@ -14,7 +14,7 @@ from screwkin.algebra.se3 import as_array, unstack
 from screwkin.dynamics.newton_euler import GRAVITY
 from screwkin.errors import InputError, UnreachableError
 from screwkin.ik.methods import solve_limb
-from screwkin.ik.numeric import IkSettings
+from screwkin.ik.numeric import ONE_START
 from screwkin.kinematics.serial_chain import SerialChain, forward
 
 HIGHEST = 0.43 / 0.437
@@ -143,9 +143,7 @@ def walking_path(chain: SerialChain, waist: float | None = None) -> FootPath:
         path = FootPath(abs(lateral), height, STEP * height, LIFT * height)
         target = walking_targets(chain, path)
         bent = np.full((len(target), len(chain.names)), 0.1)
-        reached = solve_limb(
-            chain, target, "auto", bent, IkSettings(starts=1), (len(target),), False
-        ).valid.any(1)
+        reached = solve_limb(chain, target, "auto", bent, ONE_START, (len(target),), False).valid.any(1)
         if reached.all():
             return path
     sample = int(np.argmin(reached))

@@ -11,7 +11,7 @@ from screwkin.gait.motion import Motion
 from screwkin.gait.record import Gait
 from screwkin.gait.stance import Stance
 from screwkin.ik.closed import recognised
-from screwkin.ik.numeric import IkSettings
+from screwkin.ik.numeric import ONE_START
 from screwkin.ik.pose import solve_pose
 from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.kinematics.serial_chain import SerialChain
@@ -20,8 +20,6 @@ from screwkin.model.state import State
 
 SAMPLES = 33
 """Of two steps, after which the hands' motion repeats."""
-ONE_START = IkSettings(starts=1)
-"""An arm is to swing about its home posture, not to find another one."""
 
 
 def unable_arms(robot: Robot, gait: Gait, stance: Stance, pose: tuple[str, ...]) -> dict[str, str]:

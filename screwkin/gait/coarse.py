@@ -21,7 +21,7 @@ from screwkin.gait.reach import on_other_branch, refuse_turns
 from screwkin.gait.realise import free_rotations, targets_of
 from screwkin.gait.record import Gait
 from screwkin.gait.stance import Stance, stance_of
-from screwkin.ik.numeric import IkSettings
+from screwkin.ik.numeric import ONE_START
 from screwkin.ik.pose import solve_pose
 from screwkin.kinematics.landmarks import waist_frame
 from screwkin.kinematics.mass import mass_center
@@ -36,7 +36,6 @@ STEPS = 3
 """A start, a steady step and a stop."""
 SAMPLES = 10
 """Per step."""
-_ONE_START = IkSettings(starts=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +72,7 @@ def _solved(drive: Driven, mechanism: Mechanism, plans: Sequence[Plan]) -> list[
     targets = {name: np.concatenate([one[name] for one in every]) for name in every[0]}
     start = State(targets["base"], np.array(robot.posture("home").q))
     free = free_rotations(mechanism)
-    solution = solve_pose(robot, targets, start, free=free, settings=_ONE_START)
+    solution = solve_pose(robot, targets, start, free=free, settings=ONE_START)
     good = (solution.status == Status.CONVERGED).all(axis=-1)
     for limb in robot.limbs:
         good &= ~on_other_branch(robot, targets, solution, limb, free)

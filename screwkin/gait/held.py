@@ -23,8 +23,8 @@ def with_held_joints(robot: Robot, positions: Mapping[str, float]) -> Robot:
 
     The zero pose of what is left is the one in which the held joints stand where they are held, so joint
     positions, tips and the motion of every body stay what they are. Joints coupled to held ones are held
-    too. Boxes and shapes, which contact and pictures need, and the table's text are left
-    out.
+    too. Boxes and shapes, which contact and pictures need, and the table's
+    text are left out.
 
     Args:
         robot: without closures.

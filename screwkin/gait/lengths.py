@@ -21,7 +21,7 @@ from screwkin.gait.driven import arms_of, driven
 from screwkin.gait.realise import free_rotations
 from screwkin.gait.record import Gait, gait_from_dict
 from screwkin.gait.stance import stance_of
-from screwkin.ik.numeric import IkSettings
+from screwkin.ik.numeric import ONE_START
 from screwkin.ik.pose import solve_pose
 from screwkin.kinematics.landmarks import limb_root, waist_frame
 from screwkin.kinematics.positions import link_displacements, pose_in_base
@@ -30,7 +30,6 @@ from screwkin.mechanism.choice import closed_mechanism
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 
-_ONE_START = IkSettings(starts=1)
 _GRID = 61
 """Heights tried at once, three times: each search divides the step by the number."""
 _TALLEST = 3.0
@@ -109,7 +108,7 @@ def stretched(robot: Robot, of: str = "waist") -> float:
             lowered = np.tile(T, (len(heights), 1, 1))
             lowered[:, :3, 3] -= (heights - home)[:, None] * up
             targets[tip] = lowered
-        solution = solve_pose(moving, targets, State(np.eye(4), q), free=free, settings=_ONE_START)
+        solution = solve_pose(moving, targets, State(np.eye(4), q), free=free, settings=ONE_START)
         return np.asarray((solution.status == Status.CONVERGED).all(axis=-1))
 
     low, high = home, _TALLEST * home

@@ -70,6 +70,10 @@ class IkSettings:
         return self.rotation_tolerance, self.position_tolerance
 
 
+ONE_START = IkSettings(starts=1)
+"""From the guess alone: where a limb is to move about a posture, not to find another one."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Ends:
     """Where iterations of B samples have ended: x (B, n), steps (B,), size of the residual (B,), rank (B,).
