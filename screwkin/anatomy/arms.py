@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from screwkin.anatomy.limbs import LEAST, Pair, Stance, depth
+from screwkin.anatomy.limbs import LEAST, Pair, Standing, depth
 from screwkin.anatomy.skeleton import Skeleton
 from screwkin.anatomy.symmetry import Symmetry
 
 
-def arms_of(skeleton: Skeleton, symmetry: Symmetry, stance: Stance) -> tuple[Pair | None, tuple[Pair, ...]]:
+def arm_pairs(
+    skeleton: Skeleton, symmetry: Symmetry, stance: Standing
+) -> tuple[Pair | None, tuple[Pair, ...]]:
     """The pair of arms, None without one, and the pairs that are neither arms nor legs."""
     if not stance.others:
         return None, ()
@@ -23,7 +25,7 @@ def _reach(skeleton: Skeleton, root: int) -> float:
     return max(float(np.linalg.norm(skeleton.place((name,)) - start)) for name in skeleton.links_beyond(root))
 
 
-def chains_of(skeleton: Skeleton, symmetry: Symmetry, pair: Pair) -> tuple[tuple[int, ...], tuple[int, ...]]:
+def arm_chains(skeleton: Skeleton, symmetry: Symmetry, pair: Pair) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Joints of both arms: down to where one is no single chain any more, or has no partner.
 
     A branch that carries no further joint (a gear, one finger of a gripper) is no continuation; where

@@ -9,12 +9,12 @@ import numpy as np
 from screwkin.anatomy.facets import area_of
 from screwkin.anatomy.footing import Footing
 from screwkin.anatomy.forward import Forward
-from screwkin.anatomy.limbs import SPLAYED, TOPPLED, Pair, Stance
+from screwkin.anatomy.limbs import SPLAYED, TOPPLED, Pair, Standing
 from screwkin.anatomy.outline import Outline
 from screwkin.anatomy.postures import PARTS, Home
 from screwkin.anatomy.record import Finding
 from screwkin.anatomy.skeleton import Skeleton
-from screwkin.anatomy.soles import Foot
+from screwkin.anatomy.soles import FootShape
 from screwkin.anatomy.symmetry import FINEST, PLACE, Symmetry
 from screwkin.model.robot import Robot
 
@@ -50,7 +50,7 @@ def of_forward(forward: Forward) -> Finding:
     return Finding("forward", f"({direction})", forward.confidence, forward.why)
 
 
-def of_leg(robot: Robot, side: str, foot: Foot, stance: Stance) -> Finding:
+def of_leg(robot: Robot, side: str, foot: FootShape, stance: Standing) -> Finding:
     """A leg, by how well the robot stands on it in its zero pose."""
     names = [robot.tree[i].name for i in foot.joints]
     sure = (1 - 0.4 * stance.splay / SPLAYED) * (1 - 0.3 * stance.lean / TOPPLED)
@@ -97,7 +97,7 @@ def of_sole(side: str, at: Footing, parts: Sequence[str], outline: Outline) -> F
     return Finding(f"{side}_leg", answer, _rounded(max(sure, 0.1)), why)
 
 
-def of_waist(robot: Robot, legs: Sequence[Foot], arms: Sequence[Sequence[int]]) -> Finding:
+def of_waist(robot: Robot, legs: Sequence[FootShape], arms: Sequence[Sequence[int]]) -> Finding:
     """The frame that gaits steer, and the joints between legs and arms."""
     pelvis = robot.tree[legs[0].joints[0]].parent
     shared = set(robot.path_to(pelvis))

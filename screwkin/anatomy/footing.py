@@ -12,7 +12,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.anatomy.facets import area_of, centroid_of, few_corners, hull_of
-from screwkin.anatomy.soles import Foot
+from screwkin.anatomy.soles import FootShape
 
 LEVEL = 2.0
 """Tilt of a sole [deg] below which it is noise of the mesh, and the sole level in the zero pose."""
@@ -71,7 +71,9 @@ class Footing:
         return Footing(tip, corners, self.kind, self.tilt, self.differs, self.ankle)
 
 
-def footings(left: Foot, right: Foot, offset: float, length: float, band: float) -> tuple[Footing, Footing]:
+def footings(
+    left: FootShape, right: FootShape, offset: float, length: float, band: float
+) -> tuple[Footing, Footing]:
     """Both feet, mirrored unless their meshes differ by more than noise.
 
     Args:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.anatomy.limbs import Stance
+from screwkin.anatomy.limbs import Standing
 from screwkin.anatomy.skeleton import Skeleton
-from screwkin.anatomy.soles import Foot
+from screwkin.anatomy.soles import FootShape
 from screwkin.anatomy.symmetry import TILT, Symmetry
 
 CLEAR = 0.1
@@ -27,7 +27,9 @@ class Forward:
     why: str
 
 
-def forward_of(skeleton: Skeleton, symmetry: Symmetry, stance: Stance, feet: tuple[Foot, Foot]) -> Forward:
+def forward_of(
+    skeleton: Skeleton, symmetry: Symmetry, stance: Standing, feet: tuple[FootShape, FootShape]
+) -> Forward:
     """The horizontal direction within the plane of symmetry in which most signs point."""
     ahead = np.cross(symmetry.normal, stance.up)
     signs = {
@@ -61,12 +63,12 @@ def forward_of(skeleton: Skeleton, symmetry: Symmetry, stance: Stance, feet: tup
     )
 
 
-def _sole(foot: Foot, ahead: Array) -> float:
+def _sole(foot: FootShape, ahead: Array) -> float:
     length = foot.extent(ahead)
     return float(np.clip((foot.center - foot.ankle) @ ahead / (CLEAR * length), -1, 1)) if length else 0.0
 
 
-def _toes(skeleton: Skeleton, foot: Foot, ahead: Array, length: float) -> float:
+def _toes(skeleton: Skeleton, foot: FootShape, ahead: Array, length: float) -> float:
     """Where the axes of toes lie: only of those that a foot carries, across its direction."""
     last = skeleton.robot.joint_above[foot.link]
     toes = [i for i in skeleton.next(last) if abs(skeleton.s[i] @ ahead) < 0.5]
@@ -74,7 +76,7 @@ def _toes(skeleton: Skeleton, foot: Foot, ahead: Array, length: float) -> float:
     return float(np.clip(np.mean(away), -1, 1)) if away else 0.0
 
 
-def _knee(skeleton: Skeleton, foot: Foot, normal: Array) -> float:
+def _knee(skeleton: Skeleton, foot: FootShape, normal: Array) -> float:
     """Which way the middle one of the axes across bends: its range to either side, thumb along the normal.
 
     A turn about the normal takes what hangs below backwards.

@@ -18,15 +18,15 @@ from screwkin.algebra.se3 import (
     vector_from_array,
 )
 from screwkin.anatomy import findings
-from screwkin.anatomy.arms import arms_of, chains_of
+from screwkin.anatomy.arms import arm_chains, arm_pairs
 from screwkin.anatomy.footing import LEVEL, Footing, footings
 from screwkin.anatomy.forward import Forward, forward_of
-from screwkin.anatomy.limbs import AnatomyError, Stance, root_of, stance_of
+from screwkin.anatomy.limbs import AnatomyError, Standing, root_of, standing_of
 from screwkin.anatomy.outline import Outline
 from screwkin.anatomy.postures import Legs, home_of
 from screwkin.anatomy.record import Anatomy
 from screwkin.anatomy.skeleton import Skeleton
-from screwkin.anatomy.soles import Foot, band_of, feet_of
+from screwkin.anatomy.soles import FootShape, band_of, feet_of
 from screwkin.anatomy.symmetry import TILT, Symmetry, symmetry_of
 from screwkin.anatomy.turned import seen_from
 from screwkin.anatomy.written import commented_table
@@ -79,7 +79,7 @@ def anatomy(robot: Robot) -> Anatomy:
             f"{robot.name}: none of its {len(robot.tree)} joints is the mirror image of another one, so"
             " that it has no left and right; a walk needs two mirrored legs"
         )
-    stance = stance_of(skeleton, symmetry, outline)
+    stance = standing_of(skeleton, symmetry, outline)
     feet = feet_of(skeleton, symmetry, stance, outline)
     forward = forward_of(skeleton, symmetry, stance, feet)
     return _built(robot, skeleton, symmetry, stance, feet, forward, outline)
@@ -89,8 +89,8 @@ def _built(
     robot: Robot,
     skeleton: Skeleton,
     symmetry: Symmetry,
-    stance: Stance,
-    feet: tuple[Foot, Foot],
+    stance: Standing,
+    feet: tuple[FootShape, FootShape],
     forward: Forward,
     outline: Outline,
 ) -> Anatomy:
@@ -106,8 +106,8 @@ def _built(
     _refuse_no_soles(robot, own, footing, stance)
     limbs = [_leg(whole, side, foot, at) for side, foot, at in zip(SIDES, own, footing, strict=True)]
     soles = [Sole(f"{side}_leg", _points(at.places)) for side, at in zip(SIDES, footing, strict=True)]
-    arms, rest = arms_of(skeleton, symmetry, stance)
-    chains = chains_of(skeleton, symmetry, arms) if arms else ((), ())
+    arms, rest = arm_pairs(skeleton, symmetry, stance)
+    chains = arm_chains(skeleton, symmetry, arms) if arms else ((), ())
     for side, chain in zip(SIDES, chains if sense > 0 else chains[::-1], strict=True):
         if chain:
             limbs.append(_arm(whole, side, chain))
@@ -144,7 +144,9 @@ def _built(
     return replace(found, robot=Robot.from_text(commented_table(found), robot.path))
 
 
-def _refuse_no_soles(robot: Robot, feet: Sequence[Foot], footing: Sequence[Footing], stance: Stance) -> None:
+def _refuse_no_soles(
+    robot: Robot, feet: Sequence[FootShape], footing: Sequence[Footing], stance: Standing
+) -> None:
     """Refuse edges and points that look aside, or not along z: those of hands and grippers."""
     for foot, at in zip(feet, footing, strict=True):
         if at.kind != "flat" and (at.tilt > ASIDE or stance.up[2] < 1 - TILT):
@@ -155,7 +157,7 @@ def _refuse_no_soles(robot: Robot, feet: Sequence[Foot], footing: Sequence[Footi
             )
 
 
-def _leg(robot: Robot, side: str, foot: Foot, at: Footing) -> Limb:
+def _leg(robot: Robot, side: str, foot: FootShape, at: Footing) -> Limb:
     tip = _free_name(robot, f"{side}_foot")
     return Limb(f"{side}_leg", "leg", foot.link, tip, pose_from_array(at.tip), COUPLINGS)
 
@@ -236,7 +238,7 @@ def _resting(robot: Robot, given: Sequence[Posture], length: float) -> Array:
 
 def _legs(
     robot: Robot,
-    feet: Sequence[Foot],
+    feet: Sequence[FootShape],
     footing: Sequence[Footing],
     skeleton: Skeleton,
     symmetry: Symmetry,

@@ -57,7 +57,7 @@ class Pair:
 
 
 @dataclass(frozen=True, eq=False)
-class Stance:
+class Standing:
     """How a body stands in its zero pose.
 
     Attributes:
@@ -120,7 +120,7 @@ def root_of(skeleton: Skeleton, joint: int) -> Array:
     return np.asarray(s0 + s * float((place - s0) @ s)) if skeleton.turns[joint] else place
 
 
-def stance_of(skeleton: Skeleton, symmetry: Symmetry, outline: Outline) -> Stance:
+def standing_of(skeleton: Skeleton, symmetry: Symmetry, outline: Outline) -> Standing:
     """How the body stands, and on which pair.
 
     Raises:
@@ -150,7 +150,7 @@ def stance_of(skeleton: Skeleton, symmetry: Symmetry, outline: Outline) -> Stanc
     return best
 
 
-def _unlikely(stance: Stance) -> float:
+def _unlikely(stance: Standing) -> float:
     """How little a direction suits as upward one [deg]."""
     if stance.length <= 0:
         return np.inf
@@ -161,7 +161,7 @@ def _unlikely(stance: Stance) -> float:
 
 def _standing(
     skeleton: Skeleton, symmetry: Symmetry, surface: Surface, pairs: tuple[Pair, ...], up: Array
-) -> Stance:
+) -> Standing:
     """The body on the pair that reaches lowest along a direction."""
     lows = {pair: _low(skeleton, surface, pair, up) for pair in pairs}
     legs = min(pairs, key=lambda pair: lows[pair])
@@ -180,7 +180,7 @@ def _standing(
     lean = np.degrees(np.arctan2(abs(com @ ahead - foot), com @ up - low))
     splay = np.degrees(np.arctan2(abs(hip @ ahead - foot), length))
     hangs = float((hip - skeleton.place(tuple(of_trunk))) @ up) / max(length, 1e-9)
-    return Stance(up, legs, tuple(others), low, length, float(lean), float(splay), trunk, hangs)
+    return Standing(up, legs, tuple(others), low, length, float(lean), float(splay), trunk, hangs)
 
 
 def _links(skeleton: Skeleton, pair: Pair) -> tuple[str, ...]:
@@ -216,7 +216,7 @@ def _upward(skeleton: Skeleton, symmetry: Symmetry) -> list[Array]:
     return chosen
 
 
-def _refuse_other_floors(skeleton: Skeleton, surface: Surface, stance: Stance) -> None:
+def _refuse_other_floors(skeleton: Skeleton, surface: Surface, stance: Standing) -> None:
     """Refuse a body that stands on more than two limbs, on something else, or not at all."""
     robot, names = skeleton.robot, [joint.name for joint in skeleton.robot.tree]
     floor = stance.low + REACH * stance.length

@@ -20,7 +20,7 @@ from screwkin.anatomy.facets import (
     facet_below,
     hull_of,
 )
-from screwkin.anatomy.limbs import AnatomyError, Stance
+from screwkin.anatomy.limbs import AnatomyError, Standing
 from screwkin.anatomy.outline import Outline
 from screwkin.anatomy.skeleton import Skeleton
 from screwkin.anatomy.symmetry import Symmetry
@@ -32,7 +32,7 @@ CARRIES = 0.25
 
 
 @dataclass(frozen=True, eq=False)
-class Foot:
+class FootShape:
     """The foot of one leg in the zero pose, base axes.
 
     Attributes:
@@ -56,17 +56,19 @@ class Foot:
         flat = self.facet.points @ plane
         return np.asarray(plane @ centroid_of(flat[hull_of(flat)]) + self.facet.up * self.facet.height)
 
-    def turned(self, R: Array) -> Foot:
+    def turned(self, R: Array) -> FootShape:
         """The same foot in other axes."""
         facet = Facet(R @ self.facet.up, self.facet.height, self.facet.points @ R.T, self.facet.area)
-        return Foot(self.joints, self.link, facet, R @ self.ankle, self.toes)
+        return FootShape(self.joints, self.link, facet, R @ self.ankle, self.toes)
 
     def extent(self, direction: Array) -> float:
         """Of the facet along a direction [m]."""
         return float(np.ptp(self.facet.points @ direction))
 
 
-def feet_of(skeleton: Skeleton, symmetry: Symmetry, stance: Stance, outline: Outline) -> tuple[Foot, Foot]:
+def feet_of(
+    skeleton: Skeleton, symmetry: Symmetry, stance: Standing, outline: Outline
+) -> tuple[FootShape, FootShape]:
     """The feet of both legs, first that on the normal's side of the plane of symmetry.
 
     Raises:
@@ -84,7 +86,7 @@ def feet_of(skeleton: Skeleton, symmetry: Symmetry, stance: Stance, outline: Out
     return first, second
 
 
-def _foot(skeleton: Skeleton, stance: Stance, outline: Outline, root: int) -> Foot:
+def _foot(skeleton: Skeleton, stance: Standing, outline: Outline, root: int) -> FootShape:
     """The foot of the leg that begins with a joint."""
     links = skeleton.links_beyond(root)
     with_points = [name for name in links if len(outline.of([name]))]
@@ -107,19 +109,19 @@ def _foot(skeleton: Skeleton, stance: Stance, outline: Outline, root: int) -> Fo
     return foot
 
 
-def band_of(stance: Stance) -> float:
+def band_of(stance: Standing) -> float:
     """Distance from a sole's plane within which points count as in it [m]."""
     return BAND[0] + BAND[1] * stance.length
 
 
-def _standing(skeleton: Skeleton, stance: Stance, outline: Outline, root: int, last: int) -> Foot:
+def _standing(skeleton: Skeleton, stance: Standing, outline: Outline, root: int, last: int) -> FootShape:
     """The foot if it begins with the link that a joint carries."""
     path = skeleton.robot.path_to(skeleton.robot.tree[last].child)
     joints = path[path.index(root) :]
     link, *toes = skeleton.links_beyond(last)
     facet = facet_below(outline.of([link, *toes]), stance.up, band_of(stance))
     middle = facet.points.mean(axis=0)
-    return Foot(joints, link, facet, _ankle(skeleton, joints, middle, stance.length), tuple(toes))
+    return FootShape(joints, link, facet, _ankle(skeleton, joints, middle, stance.length), tuple(toes))
 
 
 def _ankle(skeleton: Skeleton, joints: tuple[int, ...], middle: Array, length: float) -> Array:
