@@ -1,7 +1,8 @@
 """Servo models as data: registers, units, and the pair of functions between SI and what a register holds.
 
 A model is one file under ``registers/``. The names of registers are the same for all models, whatever the
-maker calls them, so that the same code drives each. Ticks, speed units and load units occur only here and in
+maker calls them, so that the same code drives each: ``max_torque`` is also the maker's PWM Limit,
+``torque_limit`` its Goal PWM, ``moving_speed`` its Profile Velocity. Ticks, speed units and load units occur only here and in
 what stands on the bus; everything above is in rad, rad/s and shares of the greatest torque.
 """
 
@@ -22,6 +23,19 @@ from screwkin.motors.library import load_motor, motor_models
 
 Unit = Literal["", "tick", "speed", "load", "pwm", "0.1V", "degC", "2us", "ms"]
 Sign = Literal["none", "bit-10", "twos"]
+Mode = Literal[
+    "joint",
+    "wheel",
+    "multi-turn",
+    "velocity",
+    "pwm",
+    "current",
+    "extended position",
+    "current-based position",
+    "step",
+    "unknown",
+]
+"""What a goal means to a servo; only in ``joint`` it is an angle within the servo's own limits."""
 
 NO_SPEED_LIMIT = 0
 """What ``moving_speed`` holds when the servo may go as fast as it can."""
@@ -57,6 +71,15 @@ class Register:
 
 
 @dataclass(frozen=True)
+class Indirect:
+    """A table within the table: address n of ``count`` (2 bytes from ``addresses`` on) says what data n shows."""
+
+    addresses: int
+    data: int
+    count: int
+
+
+@dataclass(frozen=True)
 class Profile:
     """A servo model. Angles are measured from the servo's centre, positive towards greater ticks.
 
@@ -64,6 +87,9 @@ class Profile:
 
     ``range_deg / ticks`` is one tick; the greatest tick is ``ticks - 1``. Speed unit in rad/s, load unit as a
     share of the greatest torque, no-load speed in rad/s, stall torque in N m, nominal voltage in V.
+
+    ``modes`` are the values of its ``operating_mode`` register, empty where it has none; ``indirect`` its table
+    of indirect addresses; ``fast_sync_read`` the first firmware with that instruction.
     """
 
     model: str
@@ -84,6 +110,9 @@ class Profile:
     baud_table: tuple[int, ...]
     registers: Mapping[str, Register]
     aliases: tuple[str, ...] = field(default=())
+    modes: Mapping[Mode, int] = field(default_factory=lambda: MappingProxyType({}))
+    indirect: Indirect | None = None
+    fast_sync_read: int | None = None
 
     @cached_property
     def tick(self) -> float:
@@ -287,6 +316,8 @@ def _profile(data: dict[str, Any]) -> Profile:
         aliases=tuple(data.pop("aliases")),
         baud_table=tuple(data.pop("baud_table", ())),
         registers=MappingProxyType(registers),
+        modes=MappingProxyType(data.pop("modes", {})),
+        indirect=Indirect(**data.pop("indirect")) if "indirect" in data else None,
         **data,
     )
 
