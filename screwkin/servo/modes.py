@@ -19,9 +19,9 @@ def mode_registers(profile: Profile) -> tuple[str, ...]:
 def servo_mode(profile: Profile, values: Mapping[str, int]) -> Mode:
     """The mode of a servo, from the values of its registers.
 
-    Where a model has a register for the mode, that says it. Others turn without end (``wheel``) when both angle
-    limits are 0, and over several turns (``multi-turn``, where they have that) when both are at their greatest
-    value; a ``torque_control`` of 1 puts ``current`` before both.
+    Where a model has a register for the mode, that says it. Others turn without end (``wheel``) when both
+    angle limits are 0, and over several turns (``multi-turn``, where they have that) when both are at their
+    greatest value; a ``torque_control`` of 1 puts ``current`` before both.
 
     Args:
         profile: of its model.

@@ -2,8 +2,8 @@
 
 A model is one file under ``registers/``. The names of registers are the same for all models, whatever the
 maker calls them, so that the same code drives each: ``max_torque`` is also the maker's PWM Limit,
-``torque_limit`` its Goal PWM, ``moving_speed`` its Profile Velocity. Ticks, speed units and load units occur only here and in
-what stands on the bus; everything above is in rad, rad/s and shares of the greatest torque.
+``torque_limit`` its Goal PWM, ``moving_speed`` its Profile Velocity. Ticks, speed units and load units occur
+only here and in what stands on the bus; everything above is in rad, rad/s and shares of the greatest torque.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ class Register:
 
 @dataclass(frozen=True)
 class Indirect:
-    """A table within the table: address n of ``count`` (2 bytes from ``addresses`` on) says what data n shows."""
+    """A table within the table: address n of ``count``, 2 bytes wide, says what byte n of the data is."""
 
     addresses: int
     data: int
@@ -88,8 +88,8 @@ class Profile:
     ``range_deg / ticks`` is one tick; the greatest tick is ``ticks - 1``. Speed unit in rad/s, load unit as a
     share of the greatest torque, no-load speed in rad/s, stall torque in N m, nominal voltage in V.
 
-    ``modes`` are the values of its ``operating_mode`` register, empty where it has none; ``indirect`` its table
-    of indirect addresses; ``fast_sync_read`` the first firmware with that instruction.
+    ``modes`` are the values of its ``operating_mode`` register, empty where it has none; ``indirect`` its
+    table of indirect addresses; ``fast_sync_read`` the first firmware with that instruction.
     """
 
     model: str
