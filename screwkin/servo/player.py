@@ -8,7 +8,6 @@ limp. Whatever goes wrong, the servos are brought into the state for faults befo
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -18,13 +17,14 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.errors import InputError, SafetyError
 from screwkin.model.robot import Robot
-from screwkin.servo.budget import block_of, budget
-from screwkin.servo.bus import Bus, Grouped
+from screwkin.servo.budget import budget
+from screwkin.servo.bus import Bus
 from screwkin.servo.gate import Bounds, Gate
 from screwkin.servo.leave import Final, leave
-from screwkin.servo.line import BusError, LineLostError, Reply
+from screwkin.servo.line import BusError, LineLostError
 from screwkin.servo.log import Log
-from screwkin.servo.profiles import Profile, physical
+from screwkin.servo.profiles import Profile
+from screwkin.servo.reader import Reader
 from screwkin.servo.servo_map import ServoMap
 from screwkin.servo.watch import PlayStopped, ServoFault, Thresholds, Watch
 from screwkin.trajectory import Trajectory
@@ -138,8 +138,7 @@ class Player:
         self._frames = self._late = 0
         self._began = bus.clock.now()
         self._due = 0.0
-        self._queue = deque(range(len(self.bounds.ids)))
-        self._blocks = [block_of(profile) for profile in self.bounds.profiles]
+        self.reader = Reader(bus, self.servos, self.bounds, self.settings.rate, self.log, self.watch)
 
     def play(self, trajectory: Trajectory) -> PlayOutcome:
         """Play the trajectory, and leave the servos as the settings say.
@@ -195,8 +194,8 @@ class Player:
                         f"{name} (servo {id}) is of model {number}, a {profile.model} is {profile.number}"
                     )
                     continue
-                reply = self._ask(k)
-                values = self._values(k, reply)
+                reply = self.reader.ask(k)
+                values = self.reader.values(k, reply)
                 pose[k] = values["position"]
                 self.watch.seen(k, values, reply.errors, 0.0)
             except LineLostError as error:
@@ -225,7 +224,7 @@ class Player:
         self.gate.torque_limit()
         self.gate.stay(dict(enumerate(self.bounds.ticks(start).tolist())))
         self.gate.torque(True)
-        if self._torque_is_read():
+        if self.reader.sees_torque:
             self.watch.torque_limits = self.bounds.torque
         self._began = self.bus.clock.now()
         self._due = self._began
@@ -233,9 +232,6 @@ class Player:
         self._stream(frames.q, frames.time)
         rest = np.repeat(frames.q[-1:], math.ceil(self.settings.settle * frames.rate), axis=0)
         self._stream(rest, None)
-
-    def _torque_is_read(self) -> bool:
-        return all("torque_limit" in names for _, _, names in self._blocks)
 
     def _approach(self, start: Array, goal: Array) -> Array:
         """Goals of the soft start: minimum jerk, no joint above the start speed."""
@@ -264,7 +260,7 @@ class Player:
             )
             self.watch.late(late, self._time())
             self._due += period
-            self._read(goal)
+            self.reader.read(goal, self._due, self._time)
             if times is not None:
                 self._progress((i + 1) / len(q))
 
@@ -279,82 +275,6 @@ class Player:
         self._stream(q[low] * (1 - share) + q[np.minimum(low + 1, len(q) - 1)] * share, None)
         raise PlayStopped(ServoFault("interrupted", "", -1, self._time(), "stopped by the user"))
 
-    def _read(self, goal: Array) -> None:
-        """Read servos in turn until the next frame is near; who did not answer is first in the next frame.
-
-        One is read wherever a reading of usual length fits: at the highest rates nothing else would see them.
-        """
-        again: list[int] = []
-        estimate = self._estimate()
-        if self._grouped() != "none":
-            self._read_group(goal)
-            return
-        for count in range(len(self._queue)):
-            spare = min(count + 1.0, 2.0) * estimate  # the next may take longer than the mean
-            if self.bus.clock.now() + spare > self._due:
-                break
-            k = self._queue.popleft()
-            try:
-                self._take(k, self._ask(k), goal)
-                self._queue.append(k)
-            except LineLostError:
-                raise
-            except BusError:
-                again.append(k)
-                self.watch.lost(k, self._time())
-        self._queue.extendleft(reversed(again))
-
-    def _read_group(self, goal: Array) -> None:
-        start, length, _ = self._blocks[0]
-        count = max(1, budget(self.bounds.profiles, self.bus.baud).reads(self.settings.rate))
-        chosen = [self._queue[i] for i in range(min(count, len(self._queue)))]
-        self._queue.rotate(-len(chosen))
-        ids = [self.bounds.ids[k] for k in chosen]
-        replies = self.bus.read_many(ids, start, length, self._grouped())
-        for k, id in zip(chosen, ids, strict=True):
-            if id in replies:
-                self._take(k, replies[id], goal)
-            else:
-                self.watch.lost(k, self._time())
-
-    def _grouped(self) -> Grouped:
-        profiles = self.bounds.profiles
-        if len({profile.model for profile in profiles}) > 1:
-            return "none"
-        if profiles[0].has_sync_read:
-            return "sync"
-        return "bulk" if profiles[0].has_bulk_read else "none"
-
-    def _estimate(self) -> float:
-        """Time that one more reading is likely to take [s]."""
-        mean = self.bus.statistics.mean
-        return budget(self.bounds.profiles, self.bus.baud).read if math.isnan(mean) else mean
-
-    def _take(self, k: int, reply: Reply, goal: Array) -> None:
-        values, time = self._values(k, reply), self._time()
-        self.log.measured(k, values, time)
-        self.watch.seen(k, values, reply.errors, time)
-        self.watch.tracked(k, values, float(goal[k]), time)
-
-    def _ask(self, k: int) -> Reply:
-        start, length, _ = self._blocks[k]
-        return self.bus.read(self.bounds.ids[k], start, length)
-
-    def _values(self, k: int, reply: Reply) -> dict[str, float]:
-        """The values of a servo's block in SI; the torque registers as they are."""
-        profile = self.bounds.profiles[k]
-        start, _, names = self._blocks[k]
-        raw = {name: _register(profile, name, reply.data, start) for name in names}
-        values = {
-            name.removeprefix("present_"): physical(profile, name, number)
-            for name, number in raw.items()
-            if name.startswith("present_")
-        }
-        values["position"] = self.bounds.radians_of(k, raw["present_position"])
-        values["speed"] *= self.servos.joints[k].direction
-        values |= {name: float(raw[name]) for name in ("torque_enable", "torque_limit") if name in raw}
-        return values
-
     def _time(self) -> float:
         return self.bus.clock.now() - self._began
 
@@ -362,11 +282,6 @@ class Player:
 def _place(profile: Profile, name: str) -> tuple[int, int]:
     register = profile.register(name)
     return register.address, register.width
-
-
-def _register(profile: Profile, name: str, data: bytes, start: int) -> int:
-    register = profile.register(name)
-    return int.from_bytes(data[register.address - start : register.end - start], "little")
 
 
 def describe(outcome: PlayOutcome, ids: Sequence[int]) -> str:
