@@ -21,11 +21,9 @@ from screwkin.servo.budget import budget
 from screwkin.servo.bus import Bus
 from screwkin.servo.gate import Bounds, Gate
 from screwkin.servo.leave import Final, leave
-from screwkin.servo.line import BusError, LineLostError
+from screwkin.servo.line import BusError, LineLostError, Reply
 from screwkin.servo.log import Log
-from screwkin.servo.profiles import Profile
-from screwkin.servo.reader import Reader
-from screwkin.servo.servo_map import ServoMap
+from screwkin.servo.reading import Readings
 from screwkin.servo.watch import PlayStopped, ServoFault, Thresholds, Watch
 from screwkin.trajectory import Trajectory
 
@@ -129,16 +127,15 @@ class Player:
         progress: Callable[[float], None] = lambda share: None,
     ) -> None:
         self.bus, self.robot, self.settings = bus, robot, settings or PlaySettings()
-        self.servos = ServoMap.of(robot)
-        self.bounds = Bounds.of(robot, self.servos, self.settings.torque)
+        self.bounds = Bounds.of(robot, torque=self.settings.torque)
         self.gate = Gate(bus, self.bounds)
+        self.readings = Readings(bus, self.bounds)
         self.watch = Watch(self.bounds, self.settings.thresholds)
         self.log = Log(self.bounds.names, self.bounds.ids)
         self._stop, self._progress = stop, progress
         self._frames = self._late = 0
         self._began = bus.clock.now()
         self._due = 0.0
-        self.reader = Reader(bus, self.servos, self.bounds, self.settings.rate, self.log, self.watch)
 
     def play(self, trajectory: Trajectory) -> PlayOutcome:
         """Play the trajectory, and leave the servos as the settings say.
@@ -188,14 +185,15 @@ class Player:
         for k, (name, id) in enumerate(zip(self.bounds.names, self.bounds.ids, strict=True)):
             profile = self.bounds.profiles[k]
             try:
-                number = self.bus.read(id, *_place(profile, "model_number")).value
+                place = profile.register("model_number")
+                number = self.bus.read(id, place.address, place.width).value
                 if profile.verified and number != profile.number:
                     reasons.append(
                         f"{name} (servo {id}) is of model {number}, a {profile.model} is {profile.number}"
                     )
                     continue
-                reply = self.reader.ask(k)
-                values = self.reader.values(k, reply)
+                reply = self.readings.ask(k)
+                values = self.readings.values(k, reply)
                 pose[k] = values["position"]
                 self.watch.seen(k, values, reply.errors, 0.0)
             except LineLostError as error:
@@ -224,7 +222,7 @@ class Player:
         self.gate.torque_limit()
         self.gate.stay(dict(enumerate(self.bounds.ticks(start).tolist())))
         self.gate.torque(True)
-        if self.reader.sees_torque:
+        if self.readings.torque_is_read():
             self.watch.torque_limits = self.bounds.torque
         self._began = self.bus.clock.now()
         self._due = self._began
@@ -260,7 +258,7 @@ class Player:
             )
             self.watch.late(late, self._time())
             self._due += period
-            self.reader.read(goal, self._due, self._time)
+            self._read(goal)
             if times is not None:
                 self._progress((i + 1) / len(q))
 
@@ -275,13 +273,20 @@ class Player:
         self._stream(q[low] * (1 - share) + q[np.minimum(low + 1, len(q) - 1)] * share, None)
         raise PlayStopped(ServoFault("interrupted", "", -1, self._time(), "stopped by the user"))
 
+    def _read(self, goal: Array) -> None:
+        def taken(k: int, reply: Reply) -> None:
+            values, time = self.readings.values(k, reply), self._time()
+            self.log.measured(k, values, time)
+            self.watch.seen(k, values, reply.errors, time)
+            self.watch.tracked(k, values, float(goal[k]), time)
+
+        def lost(k: int) -> None:
+            self.watch.lost(k, self._time())
+
+        self.readings.read(self._due, self.settings.rate, taken, lost)
+
     def _time(self) -> float:
         return self.bus.clock.now() - self._began
-
-
-def _place(profile: Profile, name: str) -> tuple[int, int]:
-    register = profile.register(name)
-    return register.address, register.width
 
 
 def describe(outcome: PlayOutcome, ids: Sequence[int]) -> str:
