@@ -155,7 +155,9 @@ def test_a_fault_stops_the_play_and_leaves_the_announced_state(injected, kinds, 
     assert arrays["time"][-1] >= fault.time - 0.06, "the log goes up to the fault"
     rig.clock.sleep(1.0)
     rig.line.advance()
-    given_up = {rig.player.servos.joint(name).id for name in outcome.final.unconfirmed}
+    given_up = {
+        rig.player.bounds.ids[rig.player.bounds.names.index(name)] for name in outcome.final.unconfirmed
+    }
     if injected.kind == "overload":
         given_up.add(11)  # who goes on being overloaded shuts itself down some time, whatever it was told
     confirmed = [servo for servo in rig.line.servos if servo.id not in given_up]
