@@ -9,8 +9,8 @@ from screwkin.algebra.se3 import as_array, unstack
 from screwkin.dynamics.support import sole_corners
 from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.model.robot import Robot
+from screwkin.servo.frames import Frames
 from screwkin.servo.gate import Bounds
-from screwkin.servo.player import Frames
 from screwkin.trajectory import Trajectory
 
 _BETWEEN = 4

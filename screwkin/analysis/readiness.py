@@ -25,8 +25,9 @@ from screwkin.kinematics.limits import limited_joints
 from screwkin.model.records import LIMIT_TOLERANCE
 from screwkin.model.robot import Robot, robot_text
 from screwkin.model.table import load_robot
+from screwkin.servo.frames import Frames, frames_of
 from screwkin.servo.gate import Bounds
-from screwkin.servo.player import Frames, PlaySettings, frames_of
+from screwkin.servo.player import PlaySettings
 from screwkin.servo.servo_map import ServoMap
 from screwkin.trajectory import Trajectory, check_joints, load_trajectory, sha256_of
 

@@ -20,14 +20,16 @@ from screwkin.errors import InputError, UnknownNameError
 from screwkin.model.robot import Robot
 from screwkin.servo.budget import ADAPTER, budget
 from screwkin.servo.bus import Bus, open_line
+from screwkin.servo.frames import Frames
 from screwkin.servo.gate import Bounds
-from screwkin.servo.player import Frames, Player, PlayOutcome, PlaySettings, State, describe
+from screwkin.servo.leave import EndState
+from screwkin.servo.player import Player, PlayOutcome, PlaySettings, describe
 from screwkin.servo.servo_map import ServoMap
 from screwkin.servo.virtual.bus import SimulatedClock, VirtualBus
 from screwkin.servo.virtual.faults import InjectedFault
 from screwkin.servo.virtual.robot import virtual_servos
 
-_STATES: tuple[State, ...] = ("hold", "limp")
+_STATES: tuple[EndState, ...] = ("hold", "limp")
 _INTERRUPTED = 130
 _REFUSED = 4
 _RETURN_DELAY = 500e-6  # s, of a servo as it comes from the maker
@@ -178,7 +180,7 @@ def _print_outcome(outcome: PlayOutcome, facts: dict[str, Any], bounds: Bounds, 
     return _INTERRUPTED if outcome.faults[0].kind == "interrupted" else _REFUSED
 
 
-def _state(text: str) -> State:
+def _state(text: str) -> EndState:
     for state in _STATES:
         if text == state:
             return state

@@ -10,6 +10,9 @@ from screwkin.servo.bus import Bus
 from screwkin.servo.gate import Gate
 from screwkin.servo.line import BusError, LineLostError
 
+EndState = Literal["hold", "limp"]
+"""How servos can be left: stiff where they are, or without torque."""
+
 _TRIES = 3
 _SILENCE = 6  # answers missing in a row, each asked for more than once
 
@@ -34,7 +37,7 @@ class Final:
         return f"All {count} servos {does}."
 
 
-def leave(gate: Gate, bus: Bus, state: Literal["hold", "limp"], as_is: bool = False) -> Final:
+def leave(gate: Gate, bus: Bus, state: EndState, as_is: bool = False) -> Final:
     """Bring all servos into a state, and confirm it. A second interrupt does not stop it.
 
     Args:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -19,16 +19,14 @@ from screwkin.errors import InputError, SafetyError
 from screwkin.model.robot import Robot
 from screwkin.servo.budget import budget
 from screwkin.servo.bus import Bus
+from screwkin.servo.frames import Frames, approach, frames_of, run_out
 from screwkin.servo.gate import Bounds, Gate
-from screwkin.servo.leave import Final, leave
+from screwkin.servo.leave import EndState, Final, leave
 from screwkin.servo.line import BusError, LineLostError, Reply
 from screwkin.servo.log import Log
 from screwkin.servo.reading import Readings
 from screwkin.servo.watch import PlayStopped, ServoFault, Thresholds, Watch
 from screwkin.trajectory import Trajectory
-
-State = Literal["hold", "limp"]
-_PEAK = 1.875  # greatest rate of a minimum-jerk motion, as a multiple of its mean
 
 
 @dataclass(frozen=True)
@@ -48,18 +46,9 @@ class PlaySettings:
     settle: float = 0.5
     stop: float = 0.4
     tolerance: float = 0.002
-    on_fault: State = "hold"
-    at_end: State = "hold"
+    on_fault: EndState = "hold"
+    at_end: EndState = "hold"
     thresholds: Thresholds = field(default_factory=Thresholds)
-
-
-@dataclass(frozen=True, eq=False)
-class Frames:
-    """The goals of a trajectory at a rate: time (F,) [s] from its first sample, q (F, n) [rad]."""
-
-    rate: float
-    time: Array
-    q: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,28 +72,6 @@ class PlayOutcome:
             "state": self.final.state,
             "unconfirmed": list(self.final.unconfirmed),
         }
-
-
-def frames_of(bounds: Bounds, trajectory: Trajectory, rate: float = 50.0) -> Frames:
-    """The frames of a trajectory, each checked as the gate will check it.
-
-    Raises:
-        InputError: no such rate. SafetyError: a frame, or the way from one to the next, is beyond the limits.
-    """
-    if not (math.isfinite(rate) and 1.0 <= rate <= 1000.0):
-        raise InputError(f"rate {rate!r} Hz is not a rate to play at; expected 1 to 1000, such as 50")
-    count = math.ceil(trajectory.duration * rate - 1e-9) + 1
-    time = np.minimum(np.arange(count) / rate, trajectory.duration)
-    q = trajectory.sampled(trajectory.time[0] + time)[0]
-    bounds.ticks(q)
-    steps = np.abs(np.diff(q, axis=0)) * rate
-    if (steps > bounds.rate).any():
-        i, k = np.unravel_index(int((steps / bounds.rate).argmax()), steps.shape)
-        raise SafetyError(
-            f"{bounds.names[k]} (servo {bounds.ids[k]}) would have to move at {steps[i, k]:.2f} rad/s at "
-            f"{time[i]:.2f} s, its servo at most {bounds.rate[k]:.2f}"
-        )
-    return Frames(rate, time, q)
 
 
 class Player:
@@ -226,17 +193,10 @@ class Player:
             self.watch.torque_limits = self.bounds.torque
         self._began = self.bus.clock.now()
         self._due = self._began
-        self._stream(self._approach(start, frames.q[0]), None)
+        self._stream(approach(start, frames.q[0], self.settings.start_speed, frames.rate), None)
         self._stream(frames.q, frames.time)
         rest = np.repeat(frames.q[-1:], math.ceil(self.settings.settle * frames.rate), axis=0)
         self._stream(rest, None)
-
-    def _approach(self, start: Array, goal: Array) -> Array:
-        """Goals of the soft start: minimum jerk, no joint above the start speed."""
-        lasts = max(1.0, _PEAK * float(np.abs(goal - start).max()) / self.settings.start_speed)
-        u = np.arange(1, math.ceil(lasts * self.settings.rate) + 1)[:, None]
-        u = np.minimum(u / (lasts * self.settings.rate), 1.0)
-        return np.asarray(start + (goal - start) * u**3 * (10 - 15 * u + 6 * u**2))
 
     def _stream(self, q: Array, times: Array | None) -> None:
         """Send goals frame by frame at absolute times; in between, read servos as long as there is time."""
@@ -245,7 +205,7 @@ class Player:
             if (wait := self._due - clock.now()) > 0:
                 clock.sleep(wait)
             if self._stop():
-                self._come_to_rest(q, i, times)
+                self._come_to_rest(q, i)
             late = clock.now() - self._due
             self.gate.goals(goal, period)
             self._frames += 1
@@ -262,15 +222,10 @@ class Player:
             if times is not None:
                 self._progress((i + 1) / len(q))
 
-    def _come_to_rest(self, q: Array, i: int, times: Array | None) -> None:
+    def _come_to_rest(self, q: Array, i: int) -> None:
         """Run on ever more slowly for a moment, then stop."""
         self._stop = lambda: False
-        count = max(1, round(self.settings.stop * self.settings.rate))
-        steps = np.cumsum(np.linspace(1.0, 0.0, count, endpoint=False))
-        at = np.minimum(i - 1 + steps, len(q) - 1)
-        low = np.floor(np.maximum(at, 0.0)).astype(int)
-        share = (np.maximum(at, 0.0) - low)[:, None]
-        self._stream(q[low] * (1 - share) + q[np.minimum(low + 1, len(q) - 1)] * share, None)
+        self._stream(run_out(q, i, self.settings.stop, self.settings.rate), None)
         raise PlayStopped(ServoFault("interrupted", "", -1, self._time(), "stopped by the user"))
 
     def _read(self, goal: Array) -> None:

@@ -11,8 +11,8 @@ import screwkin as sk
 from screwkin.analysis.frame_deviation import frame_deviation
 from screwkin.analysis.verdict import Criteria
 from screwkin.model.robot import Robot
+from screwkin.servo.frames import frames_of
 from screwkin.servo.gate import Bounds
-from screwkin.servo.player import frames_of
 from screwkin.trajectory import Trajectory
 
 

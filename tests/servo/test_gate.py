@@ -179,3 +179,16 @@ def test_a_torque_limit_is_a_share(share):
         Bounds.of(BIOLOID, torque=share)
     with pytest.raises(SafetyError):
         Gate(Recorder(), Bounds.of(BIOLOID)).torque_limit(share)
+
+
+@pytest.mark.parametrize("torque", [1.0, 0.5])
+def test_the_effort_of_a_joint_limits_the_torque_of_its_servo(torque):
+    """An AX-12 has 1.5 N m at 1023: 0.75 N m are 511, 0.15 N m are 102, and more than 1.5 is 1023."""
+    efforts = {"right_knee": 0.75, "left_knee": 0.15, "right_elbow": 9.0}
+    joints = tuple(replace(j, effort=efforts.get(j.name, 1.5)) for j in BIOLOID.joints)
+    bus = Recorder()
+    Gate(bus, Bounds.of(replace(BIOLOID, joints=joints), torque=torque)).torque_limit()
+    expected = {13: 0.5, 14: 0.1}
+    assert dict(bus.written(34, 2)) == {
+        id: math.floor(1023 * torque * expected.get(id, 1.0)) for id in range(1, 19)
+    }

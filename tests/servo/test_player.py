@@ -9,6 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from screwkin.algebra.arrays import Array
 from screwkin.errors import InputError, SafetyError
 from screwkin.gait.files import load_gait
 from screwkin.gait.walk import walk
@@ -16,8 +17,9 @@ from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
 from screwkin.servo.budget import budget
 from screwkin.servo.bus import Bus
+from screwkin.servo.frames import frames_of, run_out
 from screwkin.servo.gate import Bounds
-from screwkin.servo.player import Player, PlaySettings, describe, frames_of
+from screwkin.servo.player import Player, PlaySettings, describe
 from screwkin.servo.profiles import load_profile
 from screwkin.servo.servo_map import ServoMap
 from screwkin.servo.virtual.bus import SimulatedClock, VirtualBus
@@ -71,6 +73,14 @@ class Rig:
                 at = address - command.address
                 found.append(int.from_bytes(command.data[at : at + 2], "little"))
         return found
+
+
+@cache
+def undisturbed() -> Array:
+    """The commands of a play that nobody stops."""
+    rig = Rig()
+    rig.play()
+    return rig.player.log.arrays({})["command"]
 
 
 def test_a_walk_is_played_frame_by_frame_without_drift():
@@ -195,16 +205,41 @@ def test_single_lost_replies_do_not_stop_a_walk():
     assert outcome.faults == ()
 
 
-@pytest.mark.parametrize("state", ["hold", "limp"])
-def test_a_wish_to_stop_brings_the_robot_to_rest_without_a_jump(state):
+@pytest.mark.parametrize(
+    ("state", "when"), [("limp", 0.6), ("hold", 1.5), ("limp", 2.0), ("hold", 2.7), ("hold", 3.3)]
+)
+def test_a_wish_to_stop_runs_out_on_the_path_within_four_tenths_of_a_second(state, when):
+    """Its own way on: the speed along the planned path falls evenly from the planned one to none in 0.4 s.
+
+    The path is that of a play that nobody stops; so much of its time has passed at the end as half of 0.4 s.
+    """
+    planned = undisturbed()
     rig = Rig(on_fault=state)
-    rig.player._stop = lambda: rig.clock.now() > WITHIN
+    rig.player._stop = lambda: rig.clock.now() > when
     outcome = rig.play()
-    assert outcome.faults[0].kind == "interrupted"
+    assert [fault.kind for fault in outcome.faults] == ["interrupted"]
     assert rig.all("torque_enable") == {1 if state == "hold" else 0}
-    rates = np.abs(np.diff(rig.player.log.arrays({})["command"], axis=0)) / 0.02
-    assert rates.max() < np.abs(steps().qd).max() * 1.1
-    assert rates[-1].max() < 0.2 * rates.max() + 0.1
+    sent = rig.player.log.arrays({})["command"]
+    count = 20  # frames of 0.4 s at 50 Hz
+    first = len(sent) - count
+    np.testing.assert_array_equal(sent[:first], planned[:first])
+    along = first - 1 + np.cumsum(1.0 - np.arange(count) / count)  # in frames of the planned path
+    for row, at in zip(sent[first:], along, strict=True):
+        low = math.floor(at)
+        share = at - low
+        np.testing.assert_allclose(row, (1 - share) * planned[low] + share * planned[low + 1], atol=1e-9)
+    assert rig.clock.now() - when < 0.4 + 0.25, "run out, confirmed, done"
+
+
+def test_a_wish_to_stop_at_the_last_frames_goes_no_farther_than_the_path():
+    q = np.linspace([0.0, 1.0], [1.0, 0.0], 10)
+    for i in range(10):
+        goals = run_out(q, i, 0.4, 50.0)
+        assert len(goals) == 20
+        assert (np.diff(goals[:, 0]) >= 0).all()
+        assert goals[:, 0].min() >= q[max(i - 1, 0), 0] - 1e-12
+        assert goals[:, 0].max() <= 1.0
+        np.testing.assert_allclose(goals.sum(axis=1), 1.0, atol=1e-12)
 
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, RuntimeError])
