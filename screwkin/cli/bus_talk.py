@@ -17,14 +17,16 @@ from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
 from screwkin.servo.bus import Bus, open_line
 from screwkin.servo.calibrate import calibrated, turned, zeros
+from screwkin.servo.packets import ProtocolName
 from screwkin.servo.profiles import load_profile
-from screwkin.servo.protocols import codec
+from screwkin.servo.protocols import protocol_named
 from screwkin.servo.servo_map import ServoMap
 from screwkin.servo.survey import (
     BAUDS,
     IDS,
     PROTOCOLS,
     AnsweringServo,
+    each_once,
     measured_angles,
     readings,
     scan,
@@ -40,7 +42,7 @@ def bus_scan(
     port: Port,
     robot: Annotated[str, typer.Option(help="Compare with the servos of this robot's table.")] = "",
     baud: Annotated[int, typer.Option(help="Only this rate; default: the robot's, or all usual ones.")] = 0,
-    protocol: Annotated[float, typer.Option(help="Only this one: 1.0 or 2.0.")] = 0.0,
+    protocol: Annotated[str, typer.Option(help="Only this one: 1.0, 2.0 or FT-SCS.")] = "",
     last: Annotated[int, typer.Option(help="Highest id to ask.")] = IDS[-1],
     everything: Annotated[bool, typer.Option("--all", help="All rates and protocols, even so.")] = False,
     rs485: Rs485 = False,
@@ -48,16 +50,15 @@ def bus_scan(
 ) -> int:
     """Who answers on a bus. With --robot all differences from its table are listed; exit code 3."""
     servos = ServoMap.of(load_robot(robot)) if robot else None
-    if protocol:
-        codec(protocol)  # refuses one that there is not
+    only = protocol_named(protocol) if protocol else None
     if baud < 0 or last not in IDS:
         raise InputError(
             f"--baud {baud} and --last {last}: expected a rate above 0, and an id up to {IDS[-1]}"
         )
     own = servos is not None and not everything
     bauds = (baud,) if baud else (servos.baud,) if servos and own else BAUDS
-    protocols = (protocol,) if protocol else (servos.protocol,) if servos and own else PROTOCOLS
-    answering = _scanned(port, bauds, protocols, last, rs485)
+    protocols = (only,) if only else (servos.protocol,) if servos and own else PROTOCOLS
+    answering = each_once(_scanned(port, bauds, protocols, last, rs485))
     wrong = servo_differences(answering, servos) if servos else []
     if as_json:
         rows = [
@@ -144,7 +145,7 @@ def _posture(robot: Robot, name: str) -> tuple[float, ...]:
 
 
 def _scanned(
-    port: str, bauds: tuple[int, ...], protocols: tuple[float, ...], last: int, rs485: bool
+    port: str, bauds: tuple[int, ...], protocols: tuple[ProtocolName, ...], last: int, rs485: bool
 ) -> list[AnsweringServo]:
     answering: list[AnsweringServo] = []
     total, done = len(bauds) * len(protocols) * (last + 1), 0
@@ -164,7 +165,7 @@ def _scanned(
 
 
 @contextmanager
-def _opened(port: str, baud: int, protocol: float, rs485: bool) -> Iterator[Bus]:
+def _opened(port: str, baud: int, protocol: ProtocolName, rs485: bool) -> Iterator[Bus]:
     bus = Bus(open_line(port, baud, rs485), protocol, baud)
     try:
         yield bus

@@ -27,6 +27,7 @@ from screwkin.servo.line import (
     Reply,
     Statistics,
 )
+from screwkin.servo.packets import Instruction, Packet, ProtocolName
 from screwkin.servo.protocols import codec
 
 _MOST_NOISE = 4096  # bytes of one reply that are waited through before a babbling line counts as silent
@@ -88,7 +89,7 @@ class Bus:
 
     Args:
         line: open, and ours alone.
-        protocol: 1.0 or 2.0, of all servos on it.
+        protocol: of all servos on it, see ``protocols.CODECS``.
         baud: bits per second, for the time-outs.
         clock: what time-outs and statistics go by.
         retries: how often an exchange is repeated that got no sound reply.
@@ -98,7 +99,7 @@ class Bus:
     def __init__(
         self,
         line: ByteLine,
-        protocol: float = 1.0,
+        protocol: ProtocolName = 1.0,
         baud: int = 1_000_000,
         clock: Clock | None = None,
         *,
@@ -111,9 +112,9 @@ class Bus:
         self.statistics = Statistics()
         self._sdk = sdk
         self._port = _Port(line, self.clock, baud, patience)
-        self._handler = sdk.PacketHandler(protocol)
         self._codec = codec(protocol)
         self._facts = self._codec.FACTS
+        self._handler = sdk.PacketHandler(self._facts.driver)
 
     @property
     def patience(self) -> float:
@@ -134,7 +135,8 @@ class Bus:
         Raises:
             BusError: no sound reply. LineLostError: the port is gone.
         """
-        return int(self._exchange(id, "ping", lambda: self._handler.ping(self._port, id))[0])
+        number = int(self._exchange(id, "ping", lambda: self._handler.ping(self._port, id))[0])
+        return number if self._facts.model_at < 0 else self.read(id, self._facts.model_at, 2).value
 
     def read(self, id: int, address: int, length: int) -> Reply:
         """Bytes of a servo's table.
@@ -220,8 +222,7 @@ class Bus:
     def _grouped(self, ids: Sequence[int], address: int, length: int, grouped: Grouped) -> dict[int, Reply]:
         """The replies to one sync or bulk read, up to the first that is missing."""
         if grouped == "sync":
-            count = len(ids)
-            self._send(lambda: self._handler.syncReadTx(self._port, address, length, list(ids), count, False))
+            self._send(lambda: self._ask_in_turn(ids, address, length))
         else:
             rows = [number for id in ids for number in (length, id, address)]
             self._send(lambda: self._handler.bulkReadTx(self._port, rows, len(rows)))
@@ -237,6 +238,16 @@ class Bus:
             self.statistics.answered(self.clock.now() - began)
             replies[id] = Reply(id, bytes(data), self._codec.errors(int(error)))
         return replies
+
+    def _ask_in_turn(self, ids: Sequence[int], address: int, length: int) -> Any:
+        """Send a sync read; the driver knows that of its own protocols only."""
+        if self._facts.driver == self.protocol:
+            return self._handler.syncReadTx(self._port, address, length, list(ids), len(ids), False)
+        packet = Packet(BROADCAST, Instruction.SYNC_READ, bytes((address, length, *ids)))
+        self._port.clearPort()
+        self._port.writePort(self._codec.pack(packet))
+        self._port.setPacketTimeout((self._facts.answer_size + length) * len(ids))
+        return self._sdk.COMM_SUCCESS
 
     def _ask(self, id: int, address: int, length: int) -> tuple[bytes, int, int]:
         result = self._handler.readTx(self._port, id, address, length)

@@ -27,6 +27,9 @@ Kind = Literal[
     "ping", "read", "write", "register", "action", "factory reset", "reboot", "unknown", "malformed"
 ]
 
+ProtocolName = float | str
+"""A protocol: the makers' number, or the name of one that has none."""
+
 RequestOutcome = Literal["done", "angle", "limit", "range", "access", "instruction"]
 """What became of a request: carried out, or why not."""
 
@@ -62,7 +65,8 @@ class ProtocolFacts:
     """What distinguishes a protocol besides the bytes of its packets.
 
     Attributes:
-        number: its name, 1.0 or 2.0.
+        name: its number or name.
+        driver: the handler of the makers' driver that frames its packets.
         id_at, length_at, error_at: places in an answer: of the id, of the length, of the error byte.
         length_width: bytes of the length.
         counted: bytes that the length counts besides the data.
@@ -70,12 +74,15 @@ class ProtocolFacts:
             without data.
         driver_options: what the makers' driver wants to know when it receives a packet.
         goal_switches_torque_on: writing a goal does so.
+        model_at: where the model number is read after a ping; -1 where the driver's ping names it.
         ping_names_model: the answer to a ping holds the model number.
+        levels: least status level at which a ping, a read, and anything else is answered.
         partial_reset: a factory reset may spare the lasting registers.
         locked_while_stiff: the lasting registers cannot be written while torque is on.
     """
 
-    number: float
+    name: ProtocolName
+    driver: float
     id_at: int
     length_at: int
     error_at: int
@@ -86,7 +93,9 @@ class ProtocolFacts:
     sync_size: int
     driver_options: tuple[bool, ...]
     goal_switches_torque_on: bool
+    model_at: int
     ping_names_model: bool
+    levels: tuple[int, int, int]
     partial_reset: bool
     locked_while_stiff: bool
 

@@ -20,6 +20,7 @@ from typing import Any, Literal
 
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.motors.library import load_motor, motor_models
+from screwkin.servo.packets import ProtocolName
 
 Unit = Literal["", "tick", "speed", "load", "pwm", "0.1V", "degC", "2us", "ms"]
 Sign = Literal["none", "bit-10", "twos"]
@@ -94,7 +95,7 @@ class Profile:
 
     model: str
     number: int
-    protocol: float
+    protocol: ProtocolName
     ticks: int
     range_deg: float
     centre: int

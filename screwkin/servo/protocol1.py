@@ -32,7 +32,8 @@ from screwkin.servo.packets import (
 )
 
 FACTS = ProtocolFacts(
-    number=1.0,
+    name=1.0,
+    driver=1.0,
     id_at=2,
     length_at=3,
     error_at=4,
@@ -43,7 +44,9 @@ FACTS = ProtocolFacts(
     sync_size=8,
     driver_options=(),
     goal_switches_torque_on=True,
+    model_at=-1,
     ping_names_model=False,
+    levels=(0, 1, 2),
     partial_reset=False,
     locked_while_stiff=False,
 )

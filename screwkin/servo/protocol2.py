@@ -38,7 +38,8 @@ MOST = 1024
 """Bytes that ``len`` may count: servos have no room for more, so a greater length is noise."""
 
 FACTS = ProtocolFacts(
-    number=2.0,
+    name=2.0,
+    driver=2.0,
     id_at=4,
     length_at=5,
     error_at=8,
@@ -49,7 +50,9 @@ FACTS = ProtocolFacts(
     sync_size=14,
     driver_options=(False,),
     goal_switches_torque_on=False,
+    model_at=-1,
     ping_names_model=True,
+    levels=(0, 1, 2),
     partial_reset=True,
     locked_while_stiff=True,
 )

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from screwkin.errors import InputError
-from screwkin.servo import protocol1, protocol2
+from screwkin.servo import protocol1, protocol2, protocol_scs
 from screwkin.servo.line import ErrorBit
-from screwkin.servo.packets import Packet, ProtocolFacts, Request, RequestOutcome
+from screwkin.servo.packets import Packet, ProtocolFacts, ProtocolName, Request, RequestOutcome
 
 
 class Codec(Protocol):
@@ -37,16 +37,33 @@ class Codec(Protocol):
         """The error byte of an answer."""
 
 
-CODECS: Mapping[float, Codec] = {1.0: protocol1, 2.0: protocol2}
-"""Every protocol by its number."""
+CODECS: Mapping[ProtocolName, Codec] = {1.0: protocol1, 2.0: protocol2, "FT-SCS": protocol_scs}
+"""Every protocol by its name."""
 
 
-def codec(protocol: float) -> Codec:
+def protocol_named(text: str) -> ProtocolName:
+    """The protocol that a text names; case does not matter.
+
+    Raises:
+        InputError: there is no such protocol; the message lists those there are.
+    """
+    for name in CODECS:
+        if text.strip().lower() in (str(name).lower(), f"{name:g}" if isinstance(name, float) else name):
+            return name
+    raise _unknown(text)
+
+
+def codec(protocol: ProtocolName) -> Codec:
     """The functions and facts of a protocol.
 
     Raises:
         InputError: there is no such protocol; the message lists those there are.
     """
     if protocol not in CODECS:
-        raise InputError(f"invalid protocol {protocol}; expected {' or '.join(map(str, CODECS))}")
+        raise _unknown(protocol)
     return CODECS[protocol]
+
+
+def _unknown(protocol: ProtocolName) -> InputError:
+    *most, last = map(str, CODECS)
+    return InputError(f"invalid protocol {protocol}; expected {', '.join(most)} or {last}")

@@ -27,6 +27,7 @@ from screwkin.errors import Fault, InputError, TableError, UnknownNameError
 from screwkin.files import text_sha256
 from screwkin.model.robot import Robot
 from screwkin.motors.library import IN_SERVOS, has_motor, table_folder
+from screwkin.servo.packets import ProtocolName
 from screwkin.servo.profiles import (
     Profile,
     load_profile,
@@ -94,7 +95,7 @@ class ServoMap:
     """The servos of a robot in the order of its joints, all on one bus."""
 
     robot: str
-    protocol: float
+    protocol: ProtocolName
     baud: int
     joints: tuple[ServoJoint, ...]
 
@@ -114,7 +115,7 @@ class ServoMap:
                 continue  # listed among the faults
         if len(protocols := {profile.protocol for profile in profiles.values()}) > 1:
             fix = "Servos of one bus speak one protocol: change the models, or their firmware"
-            faults.append(Fault("[servos]", "models", f"speak protocols {sorted(protocols)}", fix))
+            faults.append(Fault("[servos]", "models", f"speak protocols {sorted(protocols, key=str)}", fix))
         faults += _line_faults(robot.servos, profiles.values())
         if faults:
             raise TableError(robot.path or robot.name, faults)

@@ -9,6 +9,7 @@ from screwkin.errors import InputError
 from screwkin.servo.budget import block_of
 from screwkin.servo.bus import Bus
 from screwkin.servo.line import BusError, DamagedError, LineLostError
+from screwkin.servo.packets import ProtocolName
 from screwkin.servo.profiles import Profile, load_profile, physical, profile_models
 from screwkin.servo.protocols import CODECS
 from screwkin.servo.servo_map import ServoMap
@@ -24,14 +25,23 @@ class AnsweringServo:
 
     id: int
     model: int
-    protocol: float
+    protocol: ProtocolName
     baud: int
+
+    @property
+    def profiles(self) -> tuple[str, ...]:
+        """Models with this number and protocol."""
+        pairs = [(name, load_profile(name)) for name in profile_models()]
+        return tuple(
+            name
+            for name, profile in pairs
+            if (profile.number, profile.protocol) == (self.model, self.protocol)
+        )
 
     @property
     def name(self) -> str:
         """The model's name, or its number where there is no profile."""
-        names = [name for name in profile_models() if load_profile(name).number == self.model]
-        return names[0] if names else f"model {self.model}"
+        return next(iter(self.profiles), f"model {self.model}")
 
 
 def scan(
@@ -66,6 +76,16 @@ def _spoiled(bus: Bus, id: int, number: int) -> None:
         profile = load_profile(name)
         if profile.number == number and profile.protocol == bus.protocol:
             bus.read(id, *block_of(profile)[:2])
+
+
+def each_once(answering: Iterable[AnsweringServo]) -> list[AnsweringServo]:
+    """Every servo once: one that answers in two protocols of the same frames speaks the one of its model."""
+    chosen: dict[tuple[int, int], AnsweringServo] = {}
+    for servo in answering:
+        place = (servo.baud, servo.id)
+        if place not in chosen or (servo.profiles and not chosen[place].profiles):
+            chosen[place] = servo
+    return list(chosen.values())
 
 
 def servo_differences(answering: Sequence[AnsweringServo], servos: ServoMap) -> list[str]:

@@ -15,16 +15,17 @@ from hypothesis import strategies as st
 
 import screwkin
 from screwkin.errors import InputError
-from screwkin.servo import protocol1, protocol2
+from screwkin.servo import protocol1, protocol2, protocol_scs
 from screwkin.servo.packets import Packet, Request
 from screwkin.servo.profiles import load_profile
-from screwkin.servo.protocols import CODECS, codec
+from screwkin.servo.protocols import CODECS, codec, protocol_named
 from screwkin.servo.virtual.bus import SimulatedClock, VirtualBus
 from screwkin.servo.virtual.servo import VirtualServo
 
 PACKAGE = Path(screwkin.__file__).parent
 
-BOTH = pytest.mark.parametrize("protocol", [protocol1, protocol2], ids=["1.0", "2.0"])
+EACH = pytest.mark.parametrize("protocol", CODECS.values(), ids=map(str, CODECS))
+LIKE_ONE = (protocol1, protocol_scs)  # of the same frames
 packets_of = st.builds(
     Packet,
     st.integers(0, 252),
@@ -65,6 +66,36 @@ def test_published_vectors_are_written_and_read(protocol, packet, told):
     assert protocol.parse(hexed(told)) == ([packet], b"")
 
 
+def test_the_vectors_of_ft_scs_are_read_as_a_servo_reads_them():
+    """The frames of its maker's description: a goal written, a position read, four servos at once."""
+    write = "FF FF 01 09 03 2A 00 08 00 00 E8 03 D5"
+    (packet,) = protocol_scs.parse(hexed(write))[0]
+    assert protocol_scs.command_for(packet, 1) == Request("write", 0x2A, data=hexed("00 08 00 00 E8 03"))
+    (packet,) = protocol_scs.parse(hexed("FF FF 01 04 02 38 02 BE"))[0]
+    assert protocol_scs.command_for(packet, 1) == Request("read", 0x38, 2)
+    assert protocol_scs.status(1, 0, hexed("18 05")) == hexed("FF FF 01 04 00 18 05 DD")
+    rows = " ".join(f"0{id} 00 08 00 00 E8 03" for id in (1, 2, 3, 4))
+    (packet,) = protocol_scs.parse(hexed(f"FF FF FE 20 83 2A 06 {rows} 58"))[0]
+    sync = Request("write", 0x2A, data=hexed("00 08 00 00 E8 03"), answers=False)
+    assert [protocol_scs.command_for(packet, id) for id in (1, 4, 5)] == [sync, sync, None]
+    read = Packet(0xFE, 0x82, bytes((0x38, 2, 3, 1)))
+    assert protocol_scs.command_for(read, 1) == Request("read", 0x38, 2, after=(3,))
+    assert protocol_scs.command_for(Packet(1, 8), 1) == Request("reboot", answers=False)
+
+
+def test_ft_scs_says_how_a_servo_fares_and_never_what_became_of_a_command():
+    assert protocol_scs.error_byte("limit", 0) == 0
+    assert protocol_scs.error_byte("access", 0x21) == 0x21
+    assert protocol_scs.errors(0x25) == {"voltage", "overheat", "overload"}
+    assert protocol_scs.errors(0x0A) == {"hardware", "overload"}
+
+
+def test_a_protocol_is_named_as_one_writes_it():
+    assert [protocol_named(text) for text in ("1.0", "1", " 2 ", "ft-scs")] == [1.0, 1.0, 2.0, "FT-SCS"]
+    with pytest.raises(InputError, match="invalid protocol 3"):
+        protocol_named("3")
+
+
 def test_answers_are_those_of_the_vectors():
     assert protocol1.status(1, 0, b"\x20") == hexed("FF FF 01 03 00 20 DB")
     assert protocol2.status(1, 0, hexed("06 04 26")) == hexed("FF FF FD 00 01 07 00 55 00 06 04 26 65 5D")
@@ -83,7 +114,7 @@ def test_stuffing_is_the_drivers(params):
     assert protocol2.pack(Packet(1, 3, bytes(params)))[:-2] == stuffed
 
 
-@BOTH
+@EACH
 @given(packets=st.lists(packets_of, max_size=5), data=st.data())
 def test_what_is_packed_is_read_however_the_stream_is_split(protocol, packets, data):
     stream = b"".join(map(protocol.pack, packets))
@@ -93,10 +124,10 @@ def test_what_is_packed_is_read_however_the_stream_is_split(protocol, packets, d
         got, rest = protocol.parse(rest + stream[a:b])
         found += got
     assert found == packets
-    assert rest in (b"", b"\xff"[: protocol is protocol1])
+    assert rest in (b"", b"\xff"[: protocol in LIKE_ONE])
 
 
-@BOTH
+@EACH
 @given(st.binary(max_size=80), packets_of)
 def test_a_packet_is_read_after_any_noise_once_the_line_is_silent(protocol, noise, packet):
     assert protocol.parse(noise, ended=True)[1] == b""
@@ -107,7 +138,7 @@ def test_a_packet_is_read_after_any_noise_once_the_line_is_silent(protocol, nois
     assert got[-1] == packet or overlap
 
 
-@BOTH
+@EACH
 def test_what_follows_a_corrupt_packet_is_decoded(protocol):
     good, after = Packet(1, 3, b"\x18\x00\x01\x00"), [Packet(2, 1), Packet(3, 1)]
     sound = protocol.pack(good)
@@ -117,13 +148,13 @@ def test_what_follows_a_corrupt_packet_is_decoded(protocol):
             bad = bytearray(sound)
             bad[place] ^= flip
             got = protocol.parse(bytes(bad) + tail, ended=True)[0]
-            assert got == after or (protocol is protocol1 and place == 3 and got[1:] == after)
+            assert got == after or (protocol in LIKE_ONE and place == 3 and got[1:] == after)
         lost = sound[:place] + sound[place + 1 :]
         got = protocol.parse(lost + tail, ended=True)[0]
         assert got[-2:] == after
 
 
-@BOTH
+@EACH
 def test_a_cut_packet_holds_nothing_up_after_silence(protocol):
     cut = protocol.pack(Packet(1, 3, b"\x18\x00\x01\x00"))[:-3]
     got, rest = protocol.parse(cut)
@@ -138,7 +169,7 @@ def test_a_length_beyond_any_servos_room_holds_nothing_up():
     assert protocol2.parse(waited) == ([], waited)
 
 
-@BOTH
+@EACH
 def test_a_hundred_thousand_damaged_streams_never_deceive(protocol):
     """Every packet found is sound where it stands; the stream always ends; nothing is raised."""
     random = np.random.default_rng(4)
@@ -169,7 +200,7 @@ def test_a_hundred_thousand_damaged_streams_never_deceive(protocol):
     assert found > 40_000
 
 
-@BOTH
+@pytest.mark.parametrize("protocol", [protocol1, protocol2])
 @pytest.mark.parametrize("pattern", ["FF", "FF FF FD 00", "FF FF 01 FF", "FF FF FD 00 01 00 04"])
 def test_the_worst_streams_are_read_once_per_longest_packet(protocol, pattern, monkeypatch):
     """Work grows with the length of a stream: each byte begins at most one packet that is looked into."""
@@ -179,7 +210,7 @@ def test_the_worst_streams_are_read_once_per_longest_packet(protocol, pattern, m
     text = hexed(pattern) * 2_000
     protocol.parse(text, ended=True)
     assert len(looked) <= len(text)
-    assert max(looked, default=0) <= (259 if protocol is protocol1 else 1031)
+    assert max(looked, default=0) <= (259 if protocol in LIKE_ONE else 1031)
 
 
 def test_a_sync_write_concerns_those_it_names():
@@ -203,7 +234,7 @@ def test_reads_of_many_are_answered_in_turn():
     assert protocol2.command_for(Packet(0xFE, 1), 4) == Request("ping", after=(0, 1, 2, 3))
 
 
-@BOTH
+@EACH
 @given(packet=st.builds(Packet, st.integers(0, 254), st.integers(0, 255), st.binary(max_size=30)))
 def test_any_packet_can_be_asked_what_it_wants(protocol, packet):
     for servo in (0, 1, 7, 252):
@@ -223,7 +254,7 @@ def test_the_codec_is_that_of_the_protocol():
 
 def test_a_further_protocol_is_one_file_and_one_row(monkeypatch):
     """Its servo answers on a virtual bus, and nothing else compares the numbers of protocols."""
-    further = SimpleNamespace(**{**vars(protocol1), "FACTS": replace(protocol1.FACTS, number=3.0)})
+    further = SimpleNamespace(**{**vars(protocol1), "FACTS": replace(protocol1.FACTS, name=3.0)})
     monkeypatch.setitem(CODECS, 3.0, further)
     clock = SimulatedClock()
     bus = VirtualBus([VirtualServo(replace(load_profile("AX-12A"), protocol=3.0), 7)], clock)
@@ -231,11 +262,11 @@ def test_a_further_protocol_is_one_file_and_one_row(monkeypatch):
     clock.sleep(0.01)
     assert further.parse(bus.read(64)) == ([Packet(7, 0)], b"")
 
-    assert all(number == file.FACTS.number for number, file in CODECS.items())
+    assert all(name == file.FACTS.name for name, file in CODECS.items())
     sources = [path for folder in ("servo", "cli") for path in (PACKAGE / folder).rglob("*.py")]
     assert not [path for path in sources if re.search(r"protocol (==|!=) \d", path.read_text("utf-8"))]
 
 
 def test_a_protocol_that_there_is_not_is_refused():
-    with pytest.raises(InputError, match=r"invalid protocol 1\.5; expected 1\.0 or 2\.0"):
+    with pytest.raises(InputError, match=r"invalid protocol 1\.5; expected 1\.0, 2\.0 or FT-SCS"):
         codec(1.5)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from screwkin.servo.packets import Request, RequestOutcome
+from screwkin.servo.packets import Kind, Request, RequestOutcome
 from screwkin.servo.profiles import (
     Profile,
     Register,
@@ -26,7 +26,6 @@ BOOT = 0.2
 """How long a servo is silent after a reset [s]."""
 
 _LEAST_VOLTAGE = 4.0  # V, below which nothing runs
-_LEVELS = {"ping": 0, "read": 1}  # status level from which on a command is answered; others at 2
 
 
 class VirtualServo:
@@ -141,9 +140,13 @@ class VirtualServo:
             return None
         self.advance(time)
         outcome, data = self._carry_out(command, time)
-        if not command.answers or self.get("status_level") < _LEVELS.get(command.kind, 2):
+        if not command.answers or self.get("status_level") < self._least_level(command.kind):
             return None
         return self._codec.error_byte(outcome, self.alarms), data
+
+    def _least_level(self, kind: Kind) -> int:
+        ping, read, rest = self._facts.levels
+        return {"ping": ping, "read": read}.get(kind, rest)
 
     def _carry_out(self, command: Request, time: float) -> tuple[RequestOutcome, bytes]:
         match command.kind:
