@@ -48,6 +48,10 @@ class RobotRemark(UserWarning):
     """What a robot's file leaves open, or says and a table cannot hold; the robot is read all the same."""
 
 
+class SpeedRemark(UserWarning):
+    """What makes screwkin slower on this computer; results are the same."""
+
+
 @dataclass(frozen=True)
 class Fault:
     """One wrong place of a file: where it is, what stands there and what would be right."""

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
-from screwkin.errors import MissingDependencyError, RobotRemark
+from screwkin.errors import MissingDependencyError, RobotRemark, SpeedRemark
 
 T = TypeVar("T")
 
@@ -45,19 +45,23 @@ def remark(text: str) -> None:
 
 @contextmanager
 def remarks_of_robots() -> Iterator[None]:
-    """What robots' files leave open, read inside, is a remark, once, not a warning with a line of code."""
+    """What robots' files leave open, read inside, is a remark, once, not a warning with a line of code.
+
+    So is what makes screwkin slower on this computer.
+    """
     with warnings.catch_warnings():
-        shown, said = warnings.showwarning, set[str]()
+        shown, said, kinds = warnings.showwarning, set[str](), (RobotRemark, SpeedRemark)
 
         def show(message: Warning | str, category: type[Warning], *place: Any, **rest: Any) -> None:
-            if issubclass(category, RobotRemark):
+            if issubclass(category, kinds):
                 if str(message) not in said:
                     remark(shortened(f"remark: {message}"))
                 said.add(str(message))
             else:
                 shown(message, category, *place, **rest)
 
-        warnings.simplefilter("always", RobotRemark)
+        for kind in kinds:
+            warnings.simplefilter("always", kind)
         warnings.showwarning = show
         yield
 

@@ -1,18 +1,24 @@
-"""Programs compiled to machine code by the system's C compiler, where there is one, and kept on disk.
+"""Programs compiled to machine code by the system's C compiler, where there is one, and cached on disk.
 
 Nothing here is required: without a compiler, or where it fails, ``compiled`` gives None and others compute.
+Code is loaded from a private copy of the bytes that were compiled, or checked, in this process.
 """
 
 from __future__ import annotations
 
 import ctypes
+import itertools
 import math
 import os
 import platform
 import shutil
+import signal
 import subprocess
+import tempfile
+import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, partial
 from importlib.metadata import version
@@ -20,11 +26,10 @@ from pathlib import Path
 from typing import Any
 
 from screwkin.algebra.arrays import Array
-from screwkin.cache import cache_folder, digest, seal, sealed
+from screwkin.cache import cached, digest, store
 from screwkin.compiler import calls, emit_c, series
 from screwkin.compiler.program import Group, Program
-from screwkin.errors import OutputError
-from screwkin.files import atomic_path
+from screwkin.errors import SpeedRemark
 
 FLAGS = (
     *("-std=c99", "-O2", "-march=native", "-shared", "-fPIC"),
@@ -33,6 +38,8 @@ FLAGS = (
 """Fused multiply-adds and no errno, but IEEE arithmetic otherwise: NaN and infinity keep their meaning."""
 TUNED = ("-fschedule-insns", "-fsched-pressure")
 """Tried first, as not every compiler knows them: operations that wait for nothing move in front of others."""
+PATIENCE = 120.0
+"""Seconds after which a compiler is taken to hang, and ended; the largest programs take about a tenth."""
 SHARED_FROM = 1.5e6
 """Operations of a batch from which the processor's cores share it: starting a thread costs some 1e5."""
 
@@ -161,15 +168,16 @@ def shared(key: str, text: Callable[[], str], name: str, flags: tuple[str, ...] 
         flags: for the compiler, besides ``FLAGS``.
     """
     cc = compiler()
-    if cc is None:
+    if cc is None or cc in _HANGING:
         return None
-    library = cache_folder() / f"{_name(key, cc, flags)}.so"
+    entry = _name(key, cc, flags)
     try:
-        if not sealed(library):
-            _build(text(), cc, flags, library)
-            seal(library)
-        return ctypes.CDLL(str(library))[name]
-    except (OSError, OutputError, AttributeError, subprocess.SubprocessError):
+        code = cached(entry)
+        if code is None:
+            code = _build(text(), cc, flags)
+            store(entry, code)
+        return _loaded(code)[name]
+    except (OSError, AttributeError, subprocess.SubprocessError):
         return None
 
 
@@ -209,14 +217,63 @@ def _name(key: str, cc: str, flags: tuple[str, ...]) -> str:
     )
 
 
-def _build(text: str, cc: str, flags: tuple[str, ...], library: Path) -> None:
-    """Compile beside, then rename: two processes may do so at once."""
-    library.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-    with atomic_path(library) as beside:
-        ends = [*flags, "-x", "c", "-o", str(beside), "-", "-lm"]
+_HANGING: set[str] = set()
+"""Compilers that were ended; they are not tried again in this process."""
+
+
+def _build(text: str, cc: str, flags: tuple[str, ...]) -> bytes:
+    """The library that a compiler makes of a text."""
+    with tempfile.TemporaryDirectory(prefix="screwkin-", ignore_cleanup_errors=True) as private:
+        library = Path(private) / "library.so"
+        ends = [*flags, "-x", "c", "-o", str(library), "-", "-lm"]
         for tuned in (TUNED, ()):
-            command = [cc, *FLAGS, *tuned, *ends]
-            done = subprocess.run(command, input=text, text=True, capture_output=True, timeout=300)
-            if not done.returncode:
-                return
-        done.check_returncode()
+            failed = _run([cc, *FLAGS, *tuned, *ends], text)
+            if not failed:
+                return library.read_bytes()
+        raise subprocess.CalledProcessError(failed, cc)
+
+
+def _run(command: Sequence[str], text: str) -> int:
+    """Exit code of a command that reads a text; with all that it started it is ended if it hangs."""
+    with subprocess.Popen(
+        command,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    ) as process:
+        try:
+            process.communicate(text.encode(), timeout=PATIENCE)
+        except BaseException as error:
+            with suppress(OSError):
+                if hasattr(os, "killpg"):
+                    os.killpg(process.pid, signal.SIGKILL)
+                else:
+                    process.kill()
+            if isinstance(error, subprocess.TimeoutExpired) and command[0] not in _HANGING:
+                _HANGING.add(command[0])
+                remark = f"{command[0]} was ended after {PATIENCE:g} s; programs run without machine code"
+                warnings.warn(remark, SpeedRemark, stacklevel=2)
+            raise
+        return process.returncode
+
+
+_copies = itertools.count()
+
+
+def _loaded(code: bytes) -> ctypes.CDLL:
+    """A library from memory, which nobody can change between its check and its use.
+
+    Where the system has no files in memory, or does not run them: from a folder that is this user's alone.
+    """
+    if hasattr(os, "memfd_create"):
+        with suppress(OSError), open(os.memfd_create("screwkin"), "wb") as file:
+            file.write(code)
+            file.flush()
+            # The loader knows a library by its path, and descriptors have the same numbers again and again.
+            steps = f"{next(_copies):b}".replace("1", "/.").replace("0", "/")
+            return ctypes.CDLL(f"/proc/self{steps}/fd/{file.fileno()}")
+    with tempfile.TemporaryDirectory(prefix="screwkin-", ignore_cleanup_errors=True) as private:
+        copy = Path(private) / "library.so"
+        copy.write_bytes(code)
+        return ctypes.CDLL(str(copy))

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import screwkin as sk
-from screwkin import cache
 from screwkin.compiler import native
 from screwkin.compiler.emit_python import source
 from screwkin.compiler.graph import FUNCTIONS
@@ -229,61 +228,6 @@ def test_without_a_compiler_samples_are_computed_by_python_and_numpy(monkeypatch
     assert chosen_path(program, 1) == "python"
     assert chosen_path(program, 10**6) == "numpy"
     assert native.compiled(program) is None
-
-
-@pytest.mark.skipif(not native.compiler(), reason="no C compiler")
-def test_a_compiled_program_is_kept_and_a_failing_compiler_is_no_fault(monkeypatch, tmp_path):
-    monkeypatch.setenv("SCREWKIN_CACHE", str(tmp_path / "kept"))
-    program = body.center_of_mass.program(random_tree(98))
-    assert not (tmp_path / "kept").exists()
-    assert native.compiled(program) is not None
-    cached = sorted("".join(p.suffixes) for p in (tmp_path / "kept").iterdir())
-    assert cached == [".so", ".so", ".so.sha256", ".so.sha256"], "nothing half-written is left"
-    monkeypatch.setattr(native, "compiler", lambda: "/bin/false")
-    assert native.compiled(body.center_of_mass.program(random_tree(97))) is None
-
-
-@pytest.mark.skipif(not native.compiler(), reason="no C compiler")
-@pytest.mark.parametrize("damage", ["truncated", "planted", "writable", "link", "unsealed"])
-def test_a_library_that_is_not_as_it_was_built_is_built_anew(monkeypatch, tmp_path, damage):
-    """None of these may be loaded: a damaged one ends the process, a planted one runs foreign code."""
-    monkeypatch.setenv("SCREWKIN_CACHE", str(tmp_path / "first"))
-    built = []
-    monkeypatch.setattr(
-        native, "_build", lambda *given, build=native._build: (built.append(1), build(*given))
-    )
-
-    def answer():
-        function = native.shared("answer", lambda: "int answer(void) { return 42; }", "answer")
-        return function()
-
-    assert answer() == 42
-    assert answer() == 42
-    assert len(built) == 1
-    (library,) = (tmp_path / "first").glob("*.so")
-    text = library.read_bytes()
-    folder = tmp_path / damage  # another folder, as a library of the same path is loaded already
-    monkeypatch.setenv("SCREWKIN_CACHE", str(folder))
-    folder.mkdir()
-    copy = folder / library.name
-    copy.write_bytes(text)
-    cache.seal(copy)
-    assert cache.sealed(copy)
-    if damage == "truncated":
-        copy.write_bytes(text[: len(text) // 2])
-    elif damage == "planted":
-        copy.write_bytes(text + b"more")
-    elif damage == "writable":
-        copy.chmod(0o722)
-    elif damage == "link":
-        copy.rename(folder / "elsewhere")
-        copy.symlink_to(folder / "elsewhere")
-    else:
-        (folder / f"{library.name}.sha256").unlink()
-    assert not cache.sealed(copy)
-    assert answer() == 42
-    assert len(built) == 2
-    assert cache.sealed(copy)
 
 
 def test_six_and_three_joint_limbs_alone_are_followed():
