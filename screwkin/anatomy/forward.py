@@ -14,8 +14,12 @@ from screwkin.anatomy.symmetry import TILT, Symmetry
 
 CLEAR = 0.1
 """Part of a foot's length by which its middle lies ahead of the ankle in a foot that shows its direction."""
-WEIGHTS = {"sole": 1.0, "toes": 1.0, "knees": 0.5, "base": 0.3}
-"""What each sign counts: feet must reach ahead for a fall forward to be caught; knees may bend either way."""
+WEIGHTS = {"sole": 1.0, "toes": 1.0, "knees": 0.5, "base": 0.5}
+"""What each sign counts: feet must reach ahead for a fall forward to be caught; knees may bend either way.
+
+That x points ahead is the convention of robots' files (REP 103): it holds against soles that reach behind the
+ankles by less than half of ``CLEAR``.
+"""
 
 
 @dataclass(frozen=True, eq=False)

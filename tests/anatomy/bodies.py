@@ -91,6 +91,7 @@ def biped(
     fingers: int = 0,
     bends: tuple[float, float] = (0, 0),
     hips: Sequence[float] = (0.0,),
+    ahead: float = AHEAD,
 ) -> Body:
     """A body with legs, and arms unless they have no joints.
 
@@ -105,6 +106,7 @@ def biped(
         fingers: of two joints each, at every hand.
         bends: limits of the knees.
         hips: places of pairs of legs along x.
+        ahead: how far the middle of a sole lies ahead of the ankle [m].
     """
     body = Body()
     pelvis = body.link((0, 0, 0), 4.0, (0, 0, 0.1), box((0, 0, 0.08), (0.12, 0.16, 0.1)))
@@ -119,7 +121,7 @@ def biped(
         for side in (-1, 1):
             before = len(body.places)
             end = body.chain(leg, pelvis, side * HIP_Y, bends)
-            _foot(body, end, side, foot, tilt if side < 0 else 0.0, toe)
+            _foot(body, end, side, foot, tilt if side < 0 else 0.0, toe, ahead)
             if x:
                 _shift(body, before, x)
     for side in (-1, 1) if arm else ():
@@ -134,7 +136,7 @@ def biped(
     return body
 
 
-def _foot(body: Body, end: int, side: int, kind: str, tilt: float, toe: bool) -> None:
+def _foot(body: Body, end: int, side: int, kind: str, tilt: float, toe: bool, ahead: float) -> None:
     x, y, _ = body.places[end]
     if kind == "none":
         return
@@ -142,7 +144,7 @@ def _foot(body: Body, end: int, side: int, kind: str, tilt: float, toe: bool) ->
         foot = body.link((x, y, SOLE), 0.2, (x, y, SOLE + 0.02), ball((0, 0, 0.015), 0.015))
     else:
         length = 0.14 if toe else 0.2
-        middle = AHEAD - (0.03 if toe else 0.0)
+        middle = ahead - (0.03 if toe else 0.0)
         plate = box((middle, side * 0.01, PLATE / 2), (length, 0.1, PLATE), f"{tilt} 0 0")
         foot = body.link((x, y, SOLE), 0.4, (x, y, SOLE + 0.02), plate)
     body.joint(end, foot, "")

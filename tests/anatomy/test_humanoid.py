@@ -47,6 +47,14 @@ def test_a_body_is_the_same_however_its_base_frame_lies(rpy):
     np.testing.assert_allclose(ahead, (AHEAD, 0.01, 0), atol=1e-6)  # forward is where the soles reach
 
 
+@pytest.mark.parametrize(("reach", "x"), [(-0.006, 1.0), (-0.02, -1.0)], ids=["hardly", "clearly"])
+def test_the_base_frame_faces_ahead_unless_the_soles_clearly_reach_behind_the_ankles(reach, x):
+    """3 % of a sole's length is within what designs scatter; x ahead is the convention of robots' files."""
+    seen = found(ahead=reach)
+    np.testing.assert_allclose(as_array(seen.turn)[0], (x, 0, 0), atol=1e-9)
+    assert seen.forward.confidence < 0.8
+
+
 @pytest.mark.parametrize("rpy", UP.values(), ids=UP)
 def test_at_home_soles_are_level_on_one_floor_below_the_com(rpy):
     robot = found(rpy, "0.1 0.2 0.3").robot
