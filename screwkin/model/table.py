@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
-from screwkin.errors import InputError, RobotRemark, TableError, UnknownNameError, expect
+from screwkin.errors import Fault, InputError, RobotRemark, TableError, UnknownNameError, expect
 from screwkin.model.inertias import impossible
 from screwkin.model.library import find_robot
 from screwkin.model.robot import Robot
@@ -98,11 +98,22 @@ def _read(text: str, name: str, symbolic: bool, path: Path | None = None) -> Rob
             read = parse_urdf(text, name, srdf=find_srdf(path) if path else None)
         robot, remarks = read.robot, read.remarks
     else:
+        _refuse_no_table(text, name)
         robot = parse_robot(text, name, symbolic)
         remarks = () if robot.is_symbolic else tuple(_inertia_remarks(robot))
     for remark in remarks:
         warnings.warn(f"{name}: {remark}", RobotRemark, stacklevel=3)
     return robot
+
+
+def _refuse_no_table(text: str, name: str) -> None:
+    """Nothing at all, and a text without a tag in a file whose name promises XML, are no faulty tables."""
+    if not text.strip("\ufeff\0 \t\r\n"):
+        raise TableError(name, [Fault("file", "", "is empty", "Give a screw table, URDF or MJCF")])
+    if name.lower().endswith((".urdf", ".xml", ".xacro")):
+        begins = text.split()[0][:40]
+        fix = "Expected XML: <robot ...> or <mujoco ...>"
+        raise TableError(name, [Fault("file", "", f"begins with {begins!r}", fix)])
 
 
 def _inertia_remarks(robot: Robot) -> Iterator[str]:

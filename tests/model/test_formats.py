@@ -94,3 +94,17 @@ def test_a_folder_with_one_urdf_file_is_that_robot(tmp_path: Path) -> None:
     (tmp_path / "pkg" / "urdf" / "other.urdf").write_text("")
     with pytest.raises(UnknownNameError, match=r"biped\.urdf, .*other\.urdf"):
         load_robot(tmp_path / "pkg")
+
+
+@pytest.mark.parametrize("name", ["r.urdf", "r.xml", "r.toml"])
+@pytest.mark.parametrize("text", ["", " \n\n", "\ufeff"])
+def test_an_empty_file_is_called_empty(name: str, text: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(TableError, match=rf"{name}: file: is empty"):
+        load_robot(tmp_path / name)
+
+
+def test_a_file_named_as_xml_without_a_tag_is_not_read_as_a_table(tmp_path: Path) -> None:
+    (tmp_path / "r.urdf").write_text("version https://git-lfs.github.com/spec/v1\n")
+    with pytest.raises(TableError, match=r"r\.urdf: file: begins with 'version'\. Expected XML"):
+        load_robot(tmp_path / "r.urdf")
