@@ -34,6 +34,9 @@ _MOST_NOISE = 4096  # bytes of one reply that are waited through before a babbli
 _BITS_PER_BYTE = 10  # a start bit, eight data bits and a stop bit
 _MOST_STRANGERS = 8  # sound packets of other servos that are passed over
 
+PATIENCE = 0.050
+"""Time [s] that a reply may take until round trips were measured: the slowest adapters hold it back 40 ms."""
+
 Grouped = Literal["none", "sync", "bulk"]
 """One packet that several servos answer in turn: sync read of protocol 2.0, bulk read of MX servos on 1.0."""
 
@@ -94,6 +97,7 @@ class Bus:
         clock: what time-outs and statistics go by.
         retries: how often an exchange is repeated that got no sound reply.
         patience: time [s] that a reply may take beyond that of its bytes: return delay and adapter.
+        port: its name, for messages.
     """
 
     def __init__(
@@ -104,10 +108,12 @@ class Bus:
         clock: Clock | None = None,
         *,
         retries: int = 1,
-        patience: float = 0.020,
+        patience: float = PATIENCE,
+        port: str = "",
     ) -> None:
         sdk = _driver()
         self.line, self.protocol, self.baud, self.retries = line, protocol, baud, retries
+        self.port = port
         self.clock: Clock = clock or MonotonicClock()
         self.statistics = Statistics()
         self._sdk = sdk
@@ -137,6 +143,26 @@ class Bus:
         """
         number = int(self._exchange(id, "ping", lambda: self._handler.ping(self._port, id))[0])
         return number if self._facts.model_at < 0 else self.read(id, self._facts.model_at, 2).value
+
+    def present(self, id: int) -> bool:
+        """Whether a servo answers a bare ping, as one does that is set not to answer readings.
+
+        Raises:
+            LineLostError: the port is gone.
+        """
+        try:
+            self._exchange(id, "ping", lambda: self._bare_ping(id))
+        except LineLostError:
+            raise
+        except BusError as error:
+            return isinstance(error, DamagedError)
+        return True
+
+    def _bare_ping(self, id: int) -> tuple[bytes, int, int]:
+        self._port.clearPort()
+        self._port.writePort(self._codec.pack(Packet(id, Instruction.PING)))
+        self._port.setPacketTimeout(self._facts.answer_size)
+        return self._receive(id)
 
     def read(self, id: int, address: int, length: int) -> Reply:
         """Bytes of a servo's table.
