@@ -19,6 +19,7 @@ from screwkin.errors import InputError, SafetyError
 from screwkin.model.robot import Robot
 from screwkin.servo.budget import budget
 from screwkin.servo.bus import Bus
+from screwkin.servo.examine import mending, servo_registers_differ
 from screwkin.servo.frames import Frames, approach, frames_of, run_out
 from screwkin.servo.gate import Bounds, Gate
 from screwkin.servo.leave import EndState, Final, leave
@@ -148,16 +149,13 @@ class Player:
         Raises:
             SafetyError: a servo is silent or complains, or the first sample is far; all reasons at once.
         """
-        reasons, pose = [], np.full(len(self.bounds.ids), np.nan)
+        reasons: list[str] = []
+        pose = np.full(len(self.bounds.ids), np.nan)
+        wanted, mend = Bounds.of(self.robot), mending(self.bus, self.robot)
         for k, (name, id) in enumerate(zip(self.bounds.names, self.bounds.ids, strict=True)):
-            profile = self.bounds.profiles[k]
             try:
-                place = profile.register("model_number")
-                number = self.bus.read(id, place.address, place.width).value
-                if profile.verified and number != profile.number:
-                    reasons.append(
-                        f"{name} (servo {id}) is of model {number}, a {profile.model} is {profile.number}"
-                    )
+                if differ := list(servo_registers_differ(self.bus, wanted, k, mend)):
+                    reasons += map(str, differ)
                     continue
                 reply = self.readings.ask(k)
                 values = self.readings.values(k, reply)

@@ -5,16 +5,19 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from screwkin.errors import SafetyError
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
 from screwkin.servo.bus import Bus
 from screwkin.servo.examine import differences
 from screwkin.servo.gate import Bounds
 from screwkin.servo.line import RefusedError
+from screwkin.servo.player import Player
 from screwkin.servo.servo_map import ServoMap
 from screwkin.servo.virtual.bus import SimulatedClock, VirtualBus
 from screwkin.servo.virtual.robot import virtual_servos
@@ -130,3 +133,15 @@ def refuses(bus: Bus, goal: int) -> bool:
     except RefusedError:
         return True
     return False
+
+
+@pytest.mark.parametrize(("model", "changed", "register", "value"), FAULTS)
+def test_a_play_is_refused_before_torque_and_names_the_register(model, changed, register, value):
+    robot = robot_of(model)
+    bus = bus_with(robot, changed)
+    home = np.array(robot.posture("home").q)
+    with pytest.raises(SafetyError, match=rf"right_knee \(servo 13\): {register} is ") as refusal:
+        Player(bus, robot).ready_pose(home)
+    assert refusal.value.exit_code == 4
+    assert "screwkin bus configure bioloid --port /dev/ttyUSB0 --go" in str(refusal.value)
+    assert all(servo.get("torque_enable") == 0 for servo in bus.line.servos)
