@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from screwkin.analysis.validate import Validation, validate
+    from screwkin.dynamics.forward import forward_dynamics
     from screwkin.dynamics.quantities import ground_wrench, inverse_dynamics, mass_matrix, momentum
     from screwkin.errors import ScrewkinError
     from screwkin.export.bind import bind, prepare
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "analysis.validate": "Validation validate",
+    "dynamics.forward": "forward_dynamics",
     "dynamics.quantities": "ground_wrench inverse_dynamics mass_matrix momentum",
     "errors": "ScrewkinError",
     "export.bind": "bind prepare",
@@ -80,6 +82,7 @@ __all__ = [
     "closed_mechanism",
     "com_jacobian",
     "fitting_gait",
+    "forward_dynamics",
     "frame_pose",
     "ground_wrench",
     "home",

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from screwkin.algebra import scalar
-from screwkin.algebra.scalar import Scalar, abs_, larger, minus, plus, times, where
+from screwkin.algebra.scalar import Scalar, abs_, larger, minus, over, plus, times, where
 from screwkin.algebra.se3 import Vector, cross, dot
 
 TINY = 1e-40
@@ -21,31 +22,80 @@ def cramer(columns: Sequence[Vector], wanted: Vector) -> tuple[list[Scalar], Sca
 
 
 def orthogonal(columns: Sequence[Sequence[Scalar]], wanted: Sequence[Scalar]) -> tuple[list[Scalar], Scalar]:
-    """Coefficients of n independent columns that combine to the wanted one, and the columns' volume.
+    """Coefficients of n independent columns that combine to the wanted one, and the columns' volume."""
+    system = Orthogonal.of(columns)
+    return system.solve(wanted), system.volume
+
+
+@dataclass(frozen=True)
+class Orthogonal:
+    """Independent columns made orthogonal once, for any number of wanted ones.
 
     Modified Gram-Schmidt with the wanted column carried along, which is as accurate as an elimination with
     pivots (Bjorck 1967); of too many rows the least squares.
+
+    Attributes:
+        units: the orthogonal columns, of length 1.
+        shares: of every column its size, then what of the later ones lies along it.
+        volume: product of the sizes.
     """
-    columns, rest, volume = [list(c) for c in columns], list(wanted), 1
-    shares: list[list[Scalar]] = []
-    right: list[Scalar] = []
-    for k, column in enumerate(columns):
-        size = scalar.sqrt(product(column, column))
-        unit = [x / size for x in column]
-        shares.append([product(unit, other) for other in columns[k + 1 :]])
-        for j, share in enumerate(shares[-1]):
-            columns[k + 1 + j] = _less(columns[k + 1 + j], unit, share)
-        along = product(unit, rest)
-        rest = _less(rest, unit, along)
-        shares[-1].insert(0, size)
-        right.append(along)
-        volume = times(volume, size)
-    solution: list[Scalar] = []
-    for k in reversed(range(len(columns))):
-        size, *others = shares[k]
-        known = product(others, solution)
-        solution.insert(0, minus(right[k], known) / size)
-    return solution, volume
+
+    units: list[list[Scalar]]
+    shares: list[list[Scalar]]
+    volume: Scalar
+
+    @classmethod
+    def of(cls, columns: Sequence[Sequence[Scalar]]) -> Orthogonal:
+        """Of columns of equal length, at least as long as they are many."""
+        left, volume = [list(c) for c in columns], 1
+        units: list[list[Scalar]] = []
+        shares: list[list[Scalar]] = []
+        for k, column in enumerate(left):
+            size = scalar.sqrt(product(column, column))
+            unit = [over(x, size) for x in column]
+            along = [product(unit, other) for other in left[k + 1 :]]
+            for j, share in enumerate(along):
+                left[k + 1 + j] = _less(left[k + 1 + j], unit, share)
+            units.append(unit)
+            shares.append([size, *along])
+            volume = times(volume, size)
+        return cls(units, shares, volume)
+
+    def solve(self, wanted: Sequence[Scalar]) -> list[Scalar]:
+        """Coefficients of the columns that combine to the wanted one."""
+        rest = list(wanted)
+        right: list[Scalar] = []
+        for unit in self.units:
+            along = product(unit, rest)
+            rest = _less(rest, unit, along)
+            right.append(along)
+        solution: list[Scalar] = []
+        for k in reversed(range(len(right))):
+            size, *others = self.shares[k]
+            solution.insert(0, over(minus(right[k], product(others, solution)), size))
+        return solution
+
+
+def definite(rows: Sequence[Sequence[Scalar]], wanted: Sequence[Scalar]) -> list[Scalar]:
+    """x of A x = b for a symmetric positive definite A, by L' D L from the last row up.
+
+    Where the rows are a mass matrix, joints of a tree come after those that carry them, so that what is 0
+    in structure remains 0 (Featherstone 2008, section 6.5).
+    """
+    A, size = [list(row) for row in rows], len(rows)
+    factors: list[list[Scalar]] = [[] for _ in rows]
+    for k in reversed(range(size)):
+        factors[k] = [over(A[k][i], A[k][k]) for i in range(k)]
+        for i in range(k):
+            for j in range(i + 1):
+                A[i][j] = A[j][i] = minus(A[i][j], times(factors[k][i], A[k][j]))
+    x = list(wanted)
+    for k in reversed(range(size)):
+        for i in range(k):
+            x[i] = minus(x[i], times(factors[k][i], x[k]))
+    for k in range(size):
+        x[k] = minus(over(x[k], A[k][k]), product(factors[k], x[:k]))
+    return x
 
 
 def triangular(rows: Sequence[Sequence[Scalar]]) -> list[list[Scalar]]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from screwkin.algebra.scalar import Scalar, times
+from screwkin.algebra.scalar import Scalar, plus, times
 from screwkin.algebra.screws import Wrench, at, power
 from screwkin.algebra.se3 import ZERO, Pose, Rotation, Twist, Vector, X, Y, Z, bracket, cross, dot
 from screwkin.kinematics.positions import joint_twists, link_displacements, per_coordinate, tree_rates
@@ -180,7 +180,7 @@ def composite_mass_matrix(bodies: Bodies) -> list[list[Scalar]]:
     columns = [*basis, *bodies.twists]
     momenta = [composite[robot.base_link].times(e) for e in basis]
     momenta += [composite[j.child].times(S) for j, S in zip(robot.tree, bodies.twists, strict=True)]
-    M: list[list[Scalar]] = [[0.0] * len(columns) for _ in columns]
+    M: list[list[Scalar]] = [[0] * len(columns) for _ in columns]
     for row, h in enumerate(momenta):
         path = robot.path_to(robot.tree[row - 6].child) if row >= 6 else ()
         for column in (*range(6), *(6 + k for k in path)):
@@ -193,9 +193,11 @@ def _coupled_rows(robot: Robot, M: Sequence[Sequence[Scalar]]) -> list[list[Scal
     moved: list[list[tuple[int, Scalar]]] = [[(i, 1)] for i in range(6 + len(robot.joints))]
     for k, (i, ratio) in list(enumerate(robot.gears))[len(robot.joints) :]:
         moved[6 + i].append((6 + k, ratio))
-    reduced: list[list[Scalar]] = [[0.0] * len(moved) for _ in moved]
+    reduced: list[list[Scalar]] = [[0] * len(moved) for _ in moved]
     for i, rows in enumerate(moved):
         for j, columns in enumerate(moved[: i + 1]):
-            terms = (times(times(M[a][b], r), s) for a, r in rows for b, s in columns)
-            reduced[i][j] = reduced[j][i] = sum(terms)
+            for a, r in rows:
+                for b, s in columns:
+                    reduced[i][j] = plus(reduced[i][j], times(times(M[a][b], r), s))
+            reduced[j][i] = reduced[i][j]
     return reduced

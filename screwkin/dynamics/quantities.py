@@ -7,15 +7,14 @@ from typing import Any
 from screwkin.algebra.screws import Wrench, wrench_at
 from screwkin.algebra.se3 import NO_TWIST, Pose, Twist, Vector
 from screwkin.dynamics import newton_euler
+from screwkin.dynamics.loops import Admitted, actuated_joints, refuse_loops
 from screwkin.dynamics.newton_euler import GRAVITY, Bodies
 from screwkin.dynamics.zmp import cart_table_zmp, zmp_from_wrench
 from screwkin.kinematics import mass
 from screwkin.kinematics.body import check_mass
-from screwkin.kinematics.formula import formula
+from screwkin.kinematics.formula import formula, refusing
 from screwkin.kinematics.kinds import Columns, Joints, Number
-from screwkin.model.robot import Robot, refuse_closures
-
-LOOPS = "secondary_rates of its closed_mechanism gives the loops' rates; forces in loops are not computed yet"
+from screwkin.model.robot import Robot
 
 
 @formula
@@ -51,19 +50,22 @@ def momentum(
     return wrench_at(mass.mass_center(robot, bodies.poses), h)
 
 
+@refusing(refuse_loops)
 @formula
 def mass_matrix(robot: Robot, T_world_base: Pose, q: Joints) -> Columns:
-    """Mass matrix of the floating body, by composite bodies.
+    """Mass matrix of the floating body, by composite bodies; of a robot with loops in minimal coordinates.
 
     Args:
-        robot: n joints, without loops of its own.
-        state:
+        robot: n joints, of which d drive: all of them, unless the robot has closures (``driving_joints``).
+        state: closed, where the robot has loops of its own.
 
     Returns:
-        M (..., 6+n, 6+n) for [base twist [omega; v of the base origin], world axes; joint rates].
+        M (..., 6+d, 6+d) for [base twist [omega; v of the base origin], world axes; rates of the joints that
+        drive, in table order].
 
     Raises:
-        InputError: the robot has closures, which an open tree's mass matrix does not know.
+        InputError: a loop is open.
+        SingularError: the joints that drive do not determine those that follow, at the state.
         ShapeError: a wrong shape, NaN or infinity, or a base pose that is not rigid.
 
     Example:
@@ -73,13 +75,17 @@ def mass_matrix(robot: Robot, T_world_base: Pose, q: Joints) -> Columns:
         >>> M = sk.mass_matrix(robot, sk.home(robot))
         >>> bool(np.allclose(M, M.T) and np.isclose(M[3, 3], robot.mass))
         True
+        >>> four_bar = sk.load_robot("linkages/four-bar")
+        >>> sk.mass_matrix(four_bar, sk.home(four_bar)).shape        # one joint drives
+        (7, 7)
 
-    Source: Featherstone (2008), section 6.2.
+    Source: Featherstone (2008), section 6.2; loops: projection on the motions that Davies' N admits.
     """
-    refuse_closures(robot, "mass_matrix", LOOPS)
-    return newton_euler.composite_mass_matrix(Bodies.of(robot, T_world_base.R, q))
+    M = newton_euler.composite_mass_matrix(Bodies.of(robot, T_world_base.R, q))
+    return Admitted.at(robot, q).reduced(M) if robot.closures else M
 
 
+@refusing(refuse_loops)
 @formula
 def inverse_dynamics(
     robot: Robot,
@@ -90,23 +96,31 @@ def inverse_dynamics(
     base_twist: Twist | None = None,
     base_acceleration: Twist | None = None,
     gravity: Number = GRAVITY,
+    actuated: tuple[str, ...] | None = None,
 ) -> tuple[Any, ...]:
     """Generalised force that a motion needs: wrench on the base and joint efforts (recursive Newton-Euler).
 
+    Where the robot has loops of its own, qd and qdd are read of the joints that drive; the others follow.
+
     Args:
-        robot: n joints, without loops of its own.
-        state:
+        robot: n joints.
+        state: closed, where the robot has loops of its own.
         qd: joint rates [rad/s or m/s].
         qdd: joint accelerations [rad/s^2 or m/s^2].
         base_twist: [omega; v of the base origin], world axes; default: zero.
         base_acceleration: its time derivative [alpha; a]; default: zero.
         gravity: [m/s^2], along -z of the world; a number, or one for every sample.
+        actuated: a tuple of the joints that have motors; default: those that drive (``driving_joints``).
+            Where they are more than the motions, the sum of the squares of their efforts is least.
 
     Returns:
-        (..., 6+n): wrench [m; f] on the base about its origin, world axes [N m, N]; joint efforts [N m or N].
+        (..., 6+n): wrench [m; f] on the base about its origin, world axes [N m, N]; joint efforts [N m or N],
+        0 at joints without motors.
 
     Raises:
-        InputError: the robot has closures, which the open tree's efforts do not know.
+        UnknownNameError: an actuated joint is none.
+        InputError: too few are actuated; or a loop is open.
+        SingularError: the joints that drive, or those with motors, do not determine the motion.
         ShapeError: a wrong shape, NaN or infinity, or a base pose that is not rigid.
 
     Example:
@@ -117,9 +131,12 @@ def inverse_dynamics(
         >>> bool(np.isclose(force[5], 9.81 * robot.mass))      # held up by its base
         True
 
-    Source: Featherstone (2008), section 5.3.
+    Source: Featherstone (2008), section 5.3; loops: virtual power on the motions that Davies' N admits.
     """
-    refuse_closures(robot, "inverse_dynamics", LOOPS)
+    motors = actuated_joints(robot, actuated)
+    loops = Admitted.at(robot, q) if robot.closures else None
+    if loops:
+        qd, qdd = loops.motion(robot, qd, qdd)
     wrench, efforts = newton_euler.wrench_and_efforts(
         Bodies.of(robot, T_world_base.R, q),
         qd,
@@ -128,6 +145,8 @@ def inverse_dynamics(
         base_acceleration or NO_TWIST,
         gravity,
     )
+    if loops:
+        efforts = loops.efforts(loops.generalised(efforts), motors)
     return (wrench, *efforts)
 
 

@@ -135,6 +135,8 @@ class Bound:
         self._needs = {source for source, _ in self._reads} - set(STATE)
         self._values, self._compute = _reader(self._reads), self._door.by_machine
         self._results = namedtuple("Results", names) if len(names) > 1 else None
+        self._robot = robot
+        self._refusals = {d.refuse for _, d, *_ in parts if d.refuse} if robot.closures else set()
 
     @property
     def program(self) -> Program:
@@ -146,7 +148,8 @@ class Bound:
 
         Raises:
             ShapeError: a wrong shape, NaN or infinity, a base pose that is not rigid.
-            InputError: an array is missing or not an argument of the quantities.
+            InputError: an array is missing or not an argument of the quantities; or a loop is open.
+            SingularError: a loop of the robot's own is singular.
         """
         try:
             values = self._values(state, **arrays)
@@ -156,6 +159,8 @@ class Bound:
         found: Sequence[Any] | None = self._compute(*values)
         if found is None:
             found = self._door(values)
+        for refuse in self._refusals:
+            refuse(self._robot, state)
         return tuple.__new__(self._results, found) if self._results else found[0]
 
     def in_place(self, state: State, **arrays: Any) -> tuple[Callable[[], object], Any]:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 
 from screwkin.analysis.workspace import map_program
 from screwkin.compiler.program import Program
+from screwkin.dynamics.forward import forward_dynamics
 from screwkin.dynamics.quantities import balance, ground_wrench, inverse_dynamics, mass_matrix, momentum
 from screwkin.errors import UnknownNameError
 from screwkin.gait.driven import driven
@@ -44,6 +45,7 @@ QUANTITIES: Mapping[str, Quantity] = {
         momentum,
         mass_matrix,
         inverse_dynamics,
+        forward_dynamics,
         ground_wrench,
         balance,
         network_matrix,

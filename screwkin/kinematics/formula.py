@@ -54,6 +54,10 @@ class Quantity(Protocol):
         """The straight-line program; ``optional`` names arguments with a default that are arrays."""
 
 
+Refusal = Callable[[Any, State], None]
+"""Raises where a quantity has no meaning for a robot at a state: what no formula can say."""
+
+
 def formula(function: Callable[..., Any]) -> Quantity:
     """The quantity of a formula; see the module."""
     definition = Definition(function)
@@ -68,6 +72,16 @@ def formula(function: Callable[..., Any]) -> Quantity:
     public.__signature__, public.__annotations__ = definition.signature, {"return": "Array"}
     made: Quantity = public
     return made
+
+
+def refusing(refuse: Refusal) -> Callable[[Quantity], Quantity]:
+    """A quantity whose calls for robots with loops of their own are looked at: robot and state."""
+
+    def looked_at(quantity: Quantity) -> Quantity:
+        quantity.definition.refuse = refuse
+        return quantity
+
+    return looked_at
 
 
 def robot_of(subject: Any) -> Any:
@@ -89,10 +103,12 @@ class Definition:
         parameters: its parameters' names.
         defaults: its default values.
         arrays_by_default: names of the arrays that have one.
+        refuse: what looks at states at which the quantity may have no meaning, or None.
     """
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self.function, self.name = function, function.__name__
+        self.refuse: Refusal | None = None
         hints = get_type_hints(function, include_extras=True)
         subject, *parameters = inspect.signature(function).parameters.values()
         self.kinds: dict[str, Kind] = {
@@ -122,6 +138,8 @@ class Definition:
             return self.by_formula(subject, given, choices, arrays)
         door = self.door(subject, given, choices)
         found = door(arrays)
+        if self.refuse is not None and robot_of(subject).closures:
+            self.refuse(subject, values["state"])
         return found[0] if door.names == [self.name] else dict(zip(door.names, found, strict=True))
 
     def program(self, subject: Any, *choices: Any, optional: Sequence[str] = ()) -> Program:

@@ -12,6 +12,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 import numpy as np
 
 from screwkin.algebra.scalar import Scalar
+from screwkin.algebra.screws import Wrench
 from screwkin.algebra.se3 import ZERO, Pose, Rotation, Twist, Vector, leaves
 from screwkin.compiler.records import identifier, matrix
 from screwkin.errors import InputError, UnknownNameError
@@ -112,6 +113,7 @@ KINDS: dict[Any, Kind] = {
     Pose: Kind("(..., 4, 4)", lambda robot: (4, 4), _one(_pose)),
     Vector: Kind("(..., 3)", lambda robot: (3,), _one(lambda x: Vector(*x))),
     Twist: Kind("(..., 6)", lambda robot: (6,), _one(_twist)),
+    Wrench: Kind("(..., 6)", lambda robot: (6,), _one(lambda x: Wrench(Vector(*x[:3]), Vector(*x[3:])))),
     Joints: Kind("(..., n)", lambda robot: (len(robot.joints),), _one(list)),
     Number: Kind("(...)", lambda robot: (), _one(lambda x: x[0])),
     TipTwists: Kind("by tip (..., 6)", lambda robot: (), _tip_records, _tip_arrays),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 from screwkin.algebra.screws import INFINITE, Screw
 from screwkin.algebra.se3 import IDENTITY, Pose, Rotation, Twist, Vector, X, Z, exp, rotate, vector_from_array
 from screwkin.kinematics.positions import link_displacements
+from screwkin.model.library import find_robot
 from screwkin.model.robot import Closure, Inertia, Joint, Limb, Link, Posture, Robot
 from screwkin.model.state import State
 
@@ -174,3 +176,43 @@ def spherical_wrist(center: tuple[float, float, float] = (0.3, -0.1, 0.2)) -> Ro
     hand = Pose(Rotation(Vector(0, 1, 0), Vector(0, 0, 1), Vector(1, 0, 0)), Vector(*center))
     limb = Limb("arm", "arm", "link_3", "hand", hand, ("rx", "ry", "rz"))
     return machine(links, rows, limbs=(limb,), home=(0.3, 0.9, -0.4))
+
+
+@cache
+def random_loops(seed: int, loops: int, base: str = "fixed", planar: bool = False) -> Robot:
+    """So many loops at home, each of a chain that starts at a link and is joined to an earlier one.
+
+    A chain has one joint more than closes its loop: seven in space, four where all axes are parallel.
+    """
+    rng = np.random.default_rng([seed, loops, planar])
+    names, rows, pairs = ["base"], [], []
+    for loop in range(loops):
+        start, end = (names[rng.integers(len(names))] for _ in range(2)) if loop else ("base", "base")
+        for _ in range(4 if planar else 7):
+            i = len(names)
+            kind = "revolute" if planar else str(rng.choice(TYPES))
+            one = joint(rng, i, start, kind)
+            if planar:
+                one = replace(one, screw=Screw(Vector(0, 0, 1), point(rng, 0.5)))
+            rows.append(one)
+            names.append(start := one.child)
+        pairs.append((start, end))
+    links = [body(rng, name) for name in names]
+    links[0] = replace(links[0], frame=IDENTITY)
+    return closed(machine(links, rows, base, home=rng.uniform(-0.8, 0.8, len(rows))), pairs, seed)
+
+
+def heavy_four_bar(**lengths: float) -> Robot:
+    """The bundled four-bar with bars that weigh."""
+    bars = {
+        "crank": (0.2, "crank/2", 0.06),
+        "coupler": (0.5, "crank + coupler/2", 0.18),
+        "rocker": (0.4, "ground + rocker/2", 0.14),
+    }
+    text = Path(find_robot("linkages/four-bar")).read_text(encoding="utf-8")
+    for name, (mass, x, length) in bars.items():
+        bare = f'[[link]]\nname = "{name}"\nmass = 0\n'
+        assert bare in text
+        heavy = f'[[link]]\nname = "{name}"\nmass = {mass}\ncom = ["{x}", 0, 0]\n'
+        text = text.replace(bare, f"{heavy}inertia = {{ box = [{length}, 0.01, 0.01] }}\n")
+    return Robot.from_text(text).replace(**lengths)
