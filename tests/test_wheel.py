@@ -75,7 +75,7 @@ def test_the_wheel_holds_package_data_and_types_and_nothing_else(archives):
     names = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
     assert {f"screwkin/data/{name}" for name in data_files()} | files_below("screwkin") == names
     assert "screwkin/py.typed" in names
-    assert any(name.startswith("screwkin/servo/registers/") for name in names)
+    assert any(name.startswith("screwkin/motors/models/") for name in names)
     strangers = {n for n in names if not n.startswith("screwkin/") or "__pycache__" in n or "/tests/" in n}
     assert not strangers
 

@@ -6,6 +6,7 @@ import typer
 
 from screwkin.cli import APP
 from screwkin.cli.bus_identify import bus_identify
+from screwkin.cli.bus_profiles import bus_profiles
 from screwkin.cli.bus_talk import bus_calibrate, bus_read, bus_scan
 from screwkin.cli.bus_virtual import virtual
 
@@ -20,5 +21,6 @@ def group() -> None:
 bus.command("scan")(bus_scan)
 bus.command("read")(bus_read)
 bus.command("calibrate")(bus_calibrate)
+bus.command("profiles")(bus_profiles)
 bus.command("identify")(bus_identify)
 bus.command("virtual")(virtual)

@@ -1,10 +1,10 @@
 """Figures of servo models: bundled ones by name, a user's own by the path of a TOML file.
 
-model = "XL330"
-aliases = ["XL330-M288"]
+model = "XL330-M288"
+aliases = ["XL330"]
 source = "who measured it"
 identified = true
-registers = "AX-12A"             # only in a user's file: the model whose registers the bus finds there
+registers = "AX-12A"             # the model whose registers the bus finds there, if it has none of its own
 
 [motor]                          # see ``Motor``; what is left out is its default
 constant = 0.38                  # N m/A
@@ -13,6 +13,8 @@ constant = 0.38                  # N m/A
 coulomb = 0.0089
 [ranges]                         # least and greatest value of figures that are not certain
 constant = [0.3, 0.5]
+
+``[sheet]``, ``[bus]`` and ``[registers]`` say how a bus talks to it; see ``servo.model_file``.
 """
 
 from __future__ import annotations
@@ -37,6 +39,7 @@ POSITIVE = ("constant", "resistance", "voltage", "gain", "kp", "max_duty", "max_
 IN_SERVOS = {"gain": "kp", "voltage": "voltage", "lag": "lag"}
 """Keys of ``[servos]`` in a robot's table that stand for figures of all its motors."""
 
+_TOP = ("model", "aliases", "source", "identified", "registers", "motor", "ranges", "sheet", "bus")
 _FIGURES = tuple(f.name for f in fields(Motor) if f.name != "friction")
 _COEFFICIENTS = tuple(f.name for f in fields(Friction))
 _NEEDED = tuple(f.name for f in fields(Motor) if f.default is MISSING and f.default_factory is MISSING)
@@ -60,14 +63,39 @@ def load_motor(name_or_path: str | Path, folder: Path | None = None) -> MotorMod
     """
     name = str(name_or_path).strip()
     if name.lower().endswith(".toml"):
-        for path in (Path(name), *([folder / name] if folder else [])):
-            if path.is_file():
-                return _read(path.read_bytes(), str(path))
-        raise UnknownNameError("servo model file", name, motor_models())
+        return _model(*model_table(name, folder))
     for model in _bundled():
         if name.lower() in {known.lower() for known in (model.model, *model.aliases)}:
             return model
     raise UnknownNameError("servo model with figures of its motor", name, motor_models())
+
+
+def model_table(path: str, folder: Path | None = None) -> tuple[Mapping[str, Any], str]:
+    """What a user's file of a servo model holds, and where it was.
+
+    Args:
+        path: of the file.
+        folder: where a relative path begins, besides the working folder.
+
+    Raises:
+        UnknownNameError: there is no such file. InputError: it cannot be read, or is no TOML.
+    """
+    name = path.strip()
+    for place in (Path(name), *([folder / name] if folder else [])):
+        if place.is_file():
+            try:
+                return _toml(place.read_bytes(), str(place)), str(place)
+            except OSError as error:
+                raise InputError(f"cannot read {place}: {error.strerror}") from None
+    raise UnknownNameError("servo model file", name, motor_models())
+
+
+@cache
+def bundled_tables() -> tuple[tuple[Mapping[str, Any], str], ...]:
+    """What every bundled model's file holds, and its name, in order of the alphabet."""
+    folder = files("screwkin.motors") / "models"
+    names = sorted(entry.name for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    return tuple((_toml((folder / name).read_bytes(), name), name) for name in names)
 
 
 def motors_of(robot: Robot) -> tuple[Motor, ...]:
@@ -140,9 +168,7 @@ def motor_text(model: MotorModel) -> str:
 
 @cache
 def _bundled() -> tuple[MotorModel, ...]:
-    folder = files("screwkin.motors") / "models"
-    names = sorted(entry.name for entry in folder.iterdir() if entry.name.endswith(".toml"))
-    return tuple(_read((folder / name).read_bytes(), name) for name in names)
+    return tuple(_model(table, where) for table, where in bundled_tables() if "motor" in table)
 
 
 def _names(robot: Robot) -> tuple[str, ...]:
@@ -174,11 +200,14 @@ def _with_supply(motor: Motor, servos: Mapping[str, Any]) -> Motor:
     return replace(motor, **given)
 
 
-def _read(data: bytes, where: str) -> MotorModel:
+def _toml(data: bytes, where: str) -> Mapping[str, Any]:
     try:
-        table = tomllib.loads(data.decode("utf-8"))
+        return MappingProxyType(tomllib.loads(data.decode("utf-8")))
     except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"{where} is no TOML file: {error}") from None
+
+
+def _model(table: Mapping[str, Any], where: str) -> MotorModel:
     faults = list(_faults(table))
     if faults:
         raise TableError(where, faults)
@@ -191,14 +220,25 @@ def _read(data: bytes, where: str) -> MotorModel:
         table.get("identified") is True,
         Motor(**figures, friction=friction),
         MappingProxyType({name: (float(a), float(b)) for name, (a, b) in table.get("ranges", {}).items()}),
-        str(table.get("registers", "")),
+        table["registers"] if isinstance(table.get("registers"), str) else "",
     )
+
+
+def name_faults(table: Mapping[str, Any]) -> Iterator[Fault]:
+    """Faults of what stands at the top of a model's file, before its sections."""
+    for key in table:
+        if key not in _TOP:
+            yield Fault("", key, "is unknown", f"Known are {', '.join(_TOP)}")
+    if not (isinstance(table.get("model"), str) and table["model"].strip()):
+        yield Fault("", "model", f"is {table.get('model')!r}", "Write the name of the servo model")
+    aliases = table.get("aliases", [])
+    if not (isinstance(aliases, list) and all(isinstance(alias, str) for alias in aliases)):
+        yield Fault("", "aliases", f"is {aliases!r}", "Write a list of names")
 
 
 def _faults(table: Mapping[str, Any]) -> Iterator[Fault]:
     """Every fault of a model's file."""
-    if not isinstance(table.get("model"), str):
-        yield Fault("", "model", f"is {table.get('model')!r}", "Write the name of the servo model")
+    yield from name_faults(table)
     motor = table.get("motor")
     if not isinstance(motor, Mapping):
         yield Fault("[motor]", "", "is missing", f"Write at least {', '.join(_NEEDED)} there")

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from screwkin.servo.profiles import Mode, Profile
+from screwkin.servo.model_file import Mode
+from screwkin.servo.profiles import Profile
 
 MODE_REGISTERS = ("operating_mode", "angle_limit_low", "angle_limit_high", "torque_control")
 
 
 def mode_registers(profile: Profile) -> tuple[str, ...]:
     """The registers of a model that decide its mode."""
-    if profile.modes:
+    if profile.modes and profile.multi_turn != "zero":
         return ("operating_mode",)
     return tuple(name for name in MODE_REGISTERS if name in profile.registers)
 
@@ -21,7 +22,8 @@ def servo_mode(profile: Profile, values: Mapping[str, int]) -> Mode:
 
     Where a model has a register for the mode, that says it. Others turn without end (``wheel``) when both
     angle limits are 0, and over several turns (``multi-turn``, where they have that) when both are at their
-    greatest value; a ``torque_control`` of 1 puts ``current`` before both.
+    greatest value; a ``torque_control`` of 1 puts ``current`` before both. Feetech's turn over several turns
+    when both limits are 0.
 
     Args:
         profile: of its model.
@@ -37,13 +39,14 @@ def servo_mode(profile: Profile, values: Mapping[str, int]) -> Mode:
     """
     if profile.modes:
         value = values["operating_mode"]
-        return next((mode for mode, number in profile.modes.items() if number == value), "unknown")
+        named: Mapping[int, Mode] = {number: mode for mode, number in profile.modes.items()}
+        mode = named.get(value, "unknown")
+        turns = profile.multi_turn == "zero" and values["angle_limit_low"] == values["angle_limit_high"] == 0
+        return "multi-turn" if mode == "joint" and turns else mode
     if "torque_control" in profile.registers and values["torque_control"]:
         return "current"
     low, high = values["angle_limit_low"], values["angle_limit_high"]
     if low == high == 0:
         return "wheel"
-    greatest = profile.register("angle_limit_high").high
-    if "multi_turn_offset" in profile.registers and low == high == greatest:
-        return "multi-turn"
-    return "joint"
+    turns = profile.multi_turn == "greatest" and low == high == profile.register("angle_limit_high").high
+    return "multi-turn" if turns else "joint"

@@ -1,50 +1,35 @@
 """Servo models as data: registers, units, and the pair of functions between SI and what a register holds.
 
-A model is one file under ``registers/``. The names of registers are the same for all models, whatever the
-maker calls them, so that the same code drives each: ``max_torque`` is also the maker's PWM Limit,
-``torque_limit`` its Goal PWM, ``moving_speed`` its Profile Velocity. Ticks, speed units and load units occur
-only here and in what stands on the bus; everything above is in rad, rad/s and shares of the greatest torque.
+A model is one file, see ``model_file``; the bundled ones stand in ``motors/models``. The names of registers
+are the same for all models, whatever the maker calls them, so that the same code drives each: ``max_torque``
+is also the maker's PWM Limit, ``torque_limit`` its Goal PWM, ``moving_speed`` its Profile Velocity,
+``present_load`` what it measures the load by, be that its Present Current. Ticks, speed units and load units
+occur only here and in what stands on the bus; everything above is in rad, rad/s and shares of the greatest
+torque.
 """
 
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property
-from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal
 
-from screwkin.errors import InputError, UnknownNameError
-from screwkin.motors.library import load_motor, motor_models
+from screwkin.errors import InputError, TableError, UnknownNameError
+from screwkin.motors.library import bundled_tables, load_motor, model_table, motor_models
+from screwkin.servo.model_file import Mode, Sign, bus_faults, unit_scale, value_range
 from screwkin.servo.packets import ProtocolName
-
-Unit = Literal["", "tick", "speed", "load", "pwm", "0.1V", "degC", "2us", "ms"]
-Sign = Literal["none", "bit-10", "twos"]
-Mode = Literal[
-    "joint",
-    "wheel",
-    "multi-turn",
-    "velocity",
-    "pwm",
-    "current",
-    "extended position",
-    "current-based position",
-    "step",
-    "unknown",
-]
-"""What a goal means to a servo; only in ``joint`` it is an angle within the servo's own limits."""
 
 NO_SPEED_LIMIT = 0
 """What ``moving_speed`` holds when the servo may go as fast as it can."""
 
 _RPM = 2 * math.pi / 60  # rad/s
 _DIVISOR_CLOCK = 2_000_000
-_PWM_UNIT = 1 / 885
-_UNITS: Mapping[str, float] = {"0.1V": 0.1, "degC": 1.0, "2us": 2e-6, "ms": 1e-3, "pwm": _PWM_UNIT, "": 1.0}
+_ALARM_BITS = {"voltage": 0, "overheat": 2, "overload": 5}
+_FROM_250 = 250  # baud_rate values that some models have besides the divisors
 
 
 @dataclass(frozen=True)
@@ -52,14 +37,15 @@ class Register:
     """A place of the register table: ``width`` bytes at ``address``, the low byte first.
 
     ``low`` and ``high`` bound the value (after its sign is decoded); ``sign`` says how negative values are
-    written: not at all, by bit 10, or as two's complement.
+    written, see ``model_file.Sign``. ``unit`` is what one count is: the model's ``tick``, ``speed`` or
+    ``load``, or a number and a unit.
     """
 
     name: str
     address: int
     width: int
     access: Literal["r", "rw"] = "rw"
-    unit: Unit = ""
+    unit: str = ""
     low: int = 0
     high: int = 0
     initial: int = 0
@@ -87,10 +73,15 @@ class Profile:
     ``number`` is what its ``model_number`` register holds, 0 where it is not published.
 
     ``range_deg / ticks`` is one tick; the greatest tick is ``ticks - 1``. Speed unit in rad/s, load unit as a
-    share of the greatest torque, no-load speed in rad/s, stall torque in N m, nominal voltage in V.
+    share of the greatest torque, no-load speed in rad/s, stall torque in N m, nominal voltage in V, stall
+    current in A, 0 where it is not published.
 
     ``modes`` are the values of its ``operating_mode`` register, empty where it has none; ``indirect`` its
-    table of indirect addresses; ``fast_sync_read`` the first firmware with that instruction.
+    table of indirect addresses; ``fast_sync_read`` the first firmware with that instruction;
+    ``multi_turn`` which value of both angle limits lets it turn over several turns; ``alarms`` the bits of
+    its shutdown and hardware error registers; ``reverse_bit`` that of ``drive_mode`` by which it turns the
+    other way; a position shown is the true one plus ``homing_sign`` times ``homing_offset``; ``source`` is
+    where its table stands, ``sheet`` where its figures do.
     """
 
     model: str
@@ -114,6 +105,14 @@ class Profile:
     modes: Mapping[Mode, int] = field(default_factory=lambda: MappingProxyType({}))
     indirect: Indirect | None = None
     fast_sync_read: int | None = None
+    multi_turn: Literal["", "greatest", "zero"] = ""
+    alarms: Mapping[str, int] = field(default_factory=lambda: MappingProxyType(_ALARM_BITS))
+    reverse_bit: int = 0
+    homing_sign: int = 1
+    stall_current: float = 0.0
+    baud_from_250: tuple[int, ...] = ()
+    source: str = ""
+    sheet: str = ""
 
     @cached_property
     def tick(self) -> float:
@@ -155,7 +154,8 @@ def profile_models() -> tuple[str, ...]:
 def load_profile(model: str, folder: Path | None = None) -> Profile:
     """The profile of a servo model; case and the maker's aliases do not matter.
 
-    The path of a user's own file stands for the model whose ``registers`` it names; see ``motors.library``.
+    A user's own file has ``[registers]`` of its own (see ``model_file``), or names with
+    ``registers = "AX-12A"`` the model whose registers the bus finds in it.
 
     Args:
         model: a name, or a path that ends in ``.toml``.
@@ -165,8 +165,13 @@ def load_profile(model: str, folder: Path | None = None) -> Profile:
         UnknownNameError: there is no such model, or only its motor is known; it lists those there are.
         TableError: the faults of the user's file.
     """
-    file = model.strip().lower().endswith(".toml")
-    wanted = (load_motor(model, folder).registers if file else model.strip()).lower()
+    wanted = model.strip().lower()
+    file = wanted.endswith(".toml")
+    if file:
+        table, where = model_table(model, folder)
+        if isinstance(table.get("registers"), Mapping) or "bus" in table:
+            return _profile(table, where)
+        wanted = load_motor(model, folder).registers.lower()
     for profile in _profiles():
         if wanted in {name.lower() for name in (profile.model, *profile.aliases)}:
             return profile
@@ -230,12 +235,14 @@ def rate_from_speed(profile: Profile, speed: int) -> float:
 def decode(register: Register, raw: int) -> int:
     """The value of what a register holds on the bus, its sign decoded.
 
-    On servos with bit 10 as direction, the bit stands for clockwise: towards smaller ticks, negative here.
+    On servos with a bit for the direction, it stands for clockwise: towards smaller ticks, negative here.
     """
-    if register.sign == "bit-10":
-        return -(raw & 0x3FF) if raw & 0x400 else raw & 0x3FF
     if register.sign == "twos" and raw >= 1 << (8 * register.width - 1):
         return raw - (1 << (8 * register.width))
+    if register.sign == "from-2048":
+        return raw - 2048
+    if bit := _sign_bit(register):
+        return -(raw & ~bit) if raw & bit else raw
     return raw
 
 
@@ -245,17 +252,24 @@ def encode(register: Register, value: int) -> int:
     Raises:
         InputError: outside the register's range.
     """
-    low = -0x3FF if register.sign == "bit-10" else register.low
-    high = 0x3FF if register.sign == "bit-10" else register.high
-    if not low <= value <= high:
-        raise InputError(f"register {register.name} cannot hold {value}; its range is {low} to {high}")
-    if register.sign == "bit-10":
-        return 0x400 | -value if value < 0 else value
+    if not register.low <= value <= register.high:
+        raise InputError(
+            f"register {register.name} cannot hold {value}; its range is {register.low} to {register.high}"
+        )
+    if register.sign == "from-2048":
+        return value + 2048
+    if bit := _sign_bit(register):
+        return bit | -value if value < 0 else value
     return value % (1 << (8 * register.width))
 
 
+def _sign_bit(register: Register) -> int:
+    """The bit that makes a value negative, 0 if none does."""
+    return 1 << int(register.sign[4:]) if register.sign.startswith("bit-") else 0
+
+
 def physical(profile: Profile, name: str, raw: int) -> float:
-    """What a register holds on the bus, in rad, rad/s, share of the greatest torque, V, s, degrees Celsius.
+    """What a register holds on the bus, in rad, rad/s, share of the greatest torque, V, A, s, degree Celsius.
 
     Raises:
         UnknownNameError: the model has no such register.
@@ -268,7 +282,7 @@ def physical(profile: Profile, name: str, raw: int) -> float:
         return rate_from_speed(profile, value)
     if register.unit == "load":
         return value * profile.load_unit
-    return value * _UNITS[register.unit]
+    return value * unit_scale(register.unit)
 
 
 def baud_from_register(profile: Profile, value: int) -> int:
@@ -277,6 +291,8 @@ def baud_from_register(profile: Profile, value: int) -> int:
     Raises:
         InputError: the model does not know the value.
     """
+    if profile.baud_from_250 and 0 <= value - _FROM_250 < len(profile.baud_from_250):
+        return profile.baud_from_250[value - _FROM_250]
     if not profile.baud_table:
         return _DIVISOR_CLOCK // (value + 1)
     if not 0 <= value < len(profile.baud_table):
@@ -300,28 +316,37 @@ def register_from_baud(profile: Profile, baud: int) -> int:
 
 @cache
 def _profiles() -> tuple[Profile, ...]:
-    folder = files("screwkin.servo") / "registers"
-    texts = {
-        entry.name: entry.read_text("utf-8") for entry in folder.iterdir() if entry.name.endswith(".toml")
-    }
-    return tuple(_profile(tomllib.loads(texts[name])) for name in sorted(texts))
+    profiles = [_profile(table, where) for table, where in bundled_tables() if "bus" in table]
+    return tuple(sorted(profiles, key=lambda profile: profile.model))
 
 
-def _profile(data: dict[str, Any]) -> Profile:
-    data = dict(data)
-    registers = {name: _register(name, row) for name, row in data.pop("registers").items()}
-    data.pop("baud")
+def _profile(table: Mapping[str, Any], where: str) -> Profile:
+    """The profile that a file says, if it has no faults."""
+    if faults := list(bus_faults(table)):
+        raise TableError(where, faults)
+    sheet, bus = dict(table["sheet"]), dict(table["bus"])
+    reads, baud = bus.pop("reads", ()), bus.pop("baud")
     return Profile(
-        speed_unit=data.pop("speed_unit_rpm") * _RPM,
-        no_load_speed=data.pop("no_load_rpm") * _RPM,
-        aliases=tuple(data.pop("aliases")),
-        baud_table=tuple(data.pop("baud_table", ())),
-        registers=MappingProxyType(registers),
-        modes=MappingProxyType(data.pop("modes", {})),
-        indirect=Indirect(**data.pop("indirect")) if "indirect" in data else None,
-        **data,
+        model=table["model"],
+        aliases=tuple(table.get("aliases", ())),
+        sheet=sheet.pop("source"),
+        no_load_speed=sheet.pop("no_load_rpm") * _RPM,
+        speed_unit=bus.pop("speed_unit_rpm") * _RPM,
+        has_sync_read="sync" in reads,
+        has_bulk_read="bulk" in reads,
+        verified=bus.pop("verified", True),
+        baud_table=() if baud == "divisor" else tuple(baud),
+        baud_from_250=tuple(bus.pop("baud_from_250", ())),
+        modes=MappingProxyType(bus.pop("modes", {})),
+        alarms=MappingProxyType(bus.pop("alarms", _ALARM_BITS)),
+        indirect=Indirect(**bus.pop("indirect")) if "indirect" in bus else None,
+        registers=MappingProxyType({name: _register(name, row) for name, row in table["registers"].items()}),
+        **sheet,
+        **bus,
     )
 
 
 def _register(name: str, row: Mapping[str, Any]) -> Register:
-    return Register(name, **{"high": (1 << (8 * row["width"])) - 1, **row})
+    _, most = value_range(row["width"], row.get("sign", "none"))
+    low, high = row.get("low", 0), row.get("high", most)
+    return Register(name, **{"low": low, "high": high, "initial": min(max(0, low), high), **row})

@@ -33,6 +33,15 @@ def test_a_new_servo_is_a_joint(model):
         ("MX-28-2", {"operating_mode": 4}, "extended position"),
         ("MX-28-2", {"operating_mode": 16}, "pwm"),
         ("MX-28-2", {"operating_mode": 5}, "unknown"),
+        ("XM430-W350", {"operating_mode": 5}, "current-based position"),
+        ("XM430-W350", {"operating_mode": 0}, "current"),
+        ("MX-64", {"angle_limit_low": 0, "angle_limit_high": 4095, "torque_control": 1}, "current"),
+        ("MX-64", {"angle_limit_low": 0, "angle_limit_high": 4095, "torque_control": 0}, "joint"),
+        ("XL-320", {"operating_mode": 1}, "wheel"),
+        ("XL-320", {"operating_mode": 2}, "joint"),
+        ("STS3215", {"operating_mode": 0, "angle_limit_low": 0, "angle_limit_high": 4095}, "joint"),
+        ("STS3215", {"operating_mode": 0, "angle_limit_low": 0, "angle_limit_high": 0}, "multi-turn"),
+        ("STS3215", {"operating_mode": 1, "angle_limit_low": 0, "angle_limit_high": 4095}, "velocity"),
     ],
 )
 def test_modes_are_those_of_the_makers_tables(model, values, mode):
@@ -45,6 +54,7 @@ def test_only_one_pattern_of_registers_is_another_mode(model, low, high, mode):
     values = {"angle_limit_low": low, "angle_limit_high": high, "operating_mode": mode, "torque_control": 0}
     chosen = servo_mode(profile, values)
     if profile.modes:
-        assert (chosen == "joint") == (mode == profile.modes["joint"])
+        turns = model == "STS3215" and low == high == 0
+        assert (chosen == "joint") == (mode == profile.modes["joint"] and not turns)
     elif low != high:
         assert chosen == "joint"

@@ -39,6 +39,15 @@ RPM = 2 * math.pi / 60
         ("MX-28", 29, 1.0, 4096, 360, 2048, (30, 2), (36, 2)),
         ("MX-28-2", 30, 2.0, 4096, 360, 2048, (116, 4), (132, 4)),
         ("SR-518", 0, 1.0, 1024, 300, 512, (30, 2), (36, 2)),
+        ("AX-18A", 18, 1.0, 1024, 300, 512, (30, 2), (36, 2)),
+        ("MX-64", 310, 1.0, 4096, 360, 2048, (30, 2), (36, 2)),
+        ("MX-106", 320, 1.0, 4096, 360, 2048, (30, 2), (36, 2)),
+        ("XL-320", 350, 2.0, 1024, 300, 512, (30, 2), (37, 2)),
+        ("XL330-M288", 1200, 2.0, 4096, 360, 2048, (116, 4), (132, 4)),
+        ("XL430-W250", 1060, 2.0, 4096, 360, 2048, (116, 4), (132, 4)),
+        ("XM430-W350", 1020, 2.0, 4096, 360, 2048, (116, 4), (132, 4)),
+        ("XC330-M288", 1240, 2.0, 4096, 360, 2048, (116, 4), (132, 4)),
+        ("STS3215", 777, "FT-SCS", 4096, 360, 2048, (42, 2), (56, 2)),
     ],
 )
 def test_profiles_hold_the_makers_numbers(model, number, protocol, ticks, degrees, centre, goal, present):
@@ -64,7 +73,8 @@ def test_registers_do_not_overlap_and_hold_their_own_range(model):
         assert before.end <= after.address
     for row in rows:
         assert row.low <= row.initial <= row.high
-        assert row.high < 1 << (8 * row.width)
+        assert 0 <= encode(row, row.low) < 1 << (8 * row.width)
+        assert 0 <= encode(row, row.high) < 1 << (8 * row.width)
         assert row.access in ("r", "rw")
 
 
@@ -157,7 +167,7 @@ def test_baud_rates_are_those_of_the_manuals():
 
 
 def test_unknown_models_are_told_with_the_known_ones():
-    with pytest.raises(UnknownNameError, match="AX-12A, MX-28-2, MX-28, SR-518"):
+    with pytest.raises(UnknownNameError, match=r"AX-12A, AX-18A, .* SR-518, STS3215"):
         load_profile("XM-430")
 
 
@@ -220,9 +230,10 @@ def test_all_faults_of_a_robots_servos_are_told_at_once():
 
 
 def test_a_model_of_which_only_the_motor_is_known_is_refused_by_the_bus_alone(tmp_path):
-    robot = load_robot("bioloid")
-    with pytest.raises(TableError, match="'XL430' has no registers that a bus could write"):
-        ServoMap.of(replace(robot, servos={**robot.servos, "model": "XL430"}))
+    robot, mine = load_robot("bioloid"), tmp_path / "mine.toml"
+    mine.write_text(motor_text(replace(load_motor("XL430"), model="mine")), encoding="utf-8")
+    with pytest.raises(TableError, match=r"mine.toml' has no registers that a bus could write"):
+        ServoMap.of(replace(robot, servos={**robot.servos, "model": str(mine)}))
 
 
 def test_a_users_file_has_the_registers_of_the_model_that_it_names(tmp_path):
