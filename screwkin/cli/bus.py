@@ -5,6 +5,7 @@ from __future__ import annotations
 import typer
 
 from screwkin.cli import APP
+from screwkin.cli.bus_configure import bus_configure
 from screwkin.cli.bus_identify import bus_identify
 from screwkin.cli.bus_profiles import bus_profiles
 from screwkin.cli.bus_talk import bus_calibrate, bus_read, bus_scan
@@ -20,6 +21,7 @@ def group() -> None:
 
 bus.command("scan")(bus_scan)
 bus.command("read")(bus_read)
+bus.command("configure")(bus_configure)
 bus.command("calibrate")(bus_calibrate)
 bus.command("profiles")(bus_profiles)
 bus.command("identify")(bus_identify)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
@@ -17,25 +17,29 @@ from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
 from screwkin.servo.bus import Bus, open_line
 from screwkin.servo.calibrate import calibrated, turned, zeros
+from screwkin.servo.examine import mending, servo_registers_differ
+from screwkin.servo.gate import Bounds
 from screwkin.servo.packets import ProtocolName
 from screwkin.servo.profiles import load_profile
 from screwkin.servo.protocols import protocol_named
+from screwkin.servo.roundtrip import RoundTrip, first_patience, latency_advice, measured
 from screwkin.servo.servo_map import ServoMap
 from screwkin.servo.survey import (
     BAUDS,
     IDS,
     PROTOCOLS,
     AnsweringServo,
+    comparable,
     each_once,
     measured_angles,
     readings,
     scan,
     servo_differences,
 )
+from screwkin.servo.wanted import Difference
 
 Port = Annotated[str, typer.Option(help="Serial port of the servos, as /dev/ttyUSB0.")]
 Rs485 = Annotated[bool, typer.Option("--rs485", help="Let the kernel switch direction.")]
-_SCAN_PATIENCE = 0.010  # s
 
 
 def bus_scan(
@@ -60,18 +64,42 @@ def bus_scan(
     protocols = (only,) if only else (servos.protocol,) if servos and own else PROTOCOLS
     answering = each_once(_scanned(port, bauds, protocols, last, rs485))
     wrong = servo_differences(answering, servos) if servos else []
+    registers, trip = _examined(port, load_robot(robot), answering, rs485) if servos else ((), None)
+    wrong += map(str, registers)
     if as_json:
         rows = [
             {"id": f.id, "model": f.name, "number": f.model, "protocol": f.protocol, "baud": f.baud}
             for f in answering
         ]
-        print_json({"servos": rows, "differences": wrong})
+        details = [one.to_dict() for one in registers]
+        times = trip.to_dict() if trip else None
+        print_json({"servos": rows, "differences": wrong, "registers": details, "round_trip": times})
     else:
         cells = [(f.id, f.name, f"protocol {f.protocol}", f"{f.baud} baud") for f in answering]
         print(aligned(cells, "  ") if cells else "no servo answers; are power and port right?")
         for line in wrong:
             print(line)
+        if trip:
+            print(f"an answer takes {trip}")
+    if trip and trip.is_slow:
+        remark(f"That is slow: {latency_advice(port)}.")
     return 3 if wrong or not answering else 0
+
+
+def _examined(
+    port: str, robot: Robot, answering: Sequence[AnsweringServo], rs485: bool
+) -> tuple[list[Difference], RoundTrip | None]:
+    """What the servos' registers hold otherwise than the table wants, and how long an answer takes."""
+    servos, bounds = ServoMap.of(robot), Bounds.of(robot)
+    chosen = comparable(answering, servos)
+    if not chosen:
+        return [], None
+    with opened_bus(port, servos.baud, servos.protocol, rs485) as bus:
+        mend = mending(bus, robot)
+        apart = [one for k in chosen for one in servo_registers_differ(bus, bounds, k, mend)]
+        place = bounds.profiles[chosen[0]].register("model_number")
+        trip = measured(bus, [bounds.ids[k] for k in chosen], place.address, place.width)
+    return apart, trip
 
 
 def bus_read(
@@ -89,7 +117,7 @@ def bus_read(
     servos = ServoMap.of(load_robot(robot)) if robot else None
     profile = load_profile(model) if model else servos.by_id(id).profile if servos and id >= 0 else None
     speaks = profile.protocol if profile else servos.protocol if servos else 1.0
-    with _opened(port, baud or (servos.baud if servos else 1_000_000), speaks, rs485) as bus:
+    with opened_bus(port, baud or (servos.baud if servos else 1_000_000), speaks, rs485) as bus:
         if profile is not None and id >= 0:
             data = readings(bus, profile, id)
             title = f"servo {id}, {profile.model}; rad, rad/s, s, V, degrees Celsius, shares of the torque"
@@ -124,7 +152,7 @@ def bus_calibrate(
     loaded = load_robot(robot)
     servos = ServoMap.of(turned(loaded, flip or ()))
     q = _posture(loaded, posture)
-    with _opened(port, baud or servos.baud, servos.protocol, rs485) as bus:
+    with opened_bus(port, baud or servos.baud, servos.protocol, rs485) as bus:
         zero = zeros(servos, measured_angles(bus, servos), q)
     text = calibrated(loaded, zero, flip or ())
     with atomic_write(write) as file:
@@ -152,8 +180,8 @@ def _scanned(
     with progress_bar("scan") as share:
         for baud in bauds:
             for protocol in protocols:
-                with _opened(port, baud, protocol, rs485) as bus:
-                    bus.retries, bus.patience = 1, _SCAN_PATIENCE
+                with opened_bus(port, baud, protocol, rs485) as bus:
+                    bus.patience = first_patience(port)
                     begun = done
 
                     def show(id: int, begun: int = begun) -> None:
@@ -165,8 +193,9 @@ def _scanned(
 
 
 @contextmanager
-def _opened(port: str, baud: int, protocol: ProtocolName, rs485: bool) -> Iterator[Bus]:
-    bus = Bus(open_line(port, baud, rs485), protocol, baud)
+def opened_bus(port: str, baud: int, protocol: ProtocolName, rs485: bool) -> Iterator[Bus]:
+    """A bus at a port, closed at the end."""
+    bus = Bus(open_line(port, baud, rs485), protocol, baud, port=port)
     try:
         yield bus
     finally:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from collections import deque
+from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
 from screwkin.errors import InputError, NoSolutionError
@@ -100,7 +101,7 @@ class Reply:
 
 @dataclass
 class Statistics:
-    """Counts of exchanges that wait for a reply, and their round-trip times [s]."""
+    """Counts of exchanges that wait for a reply, and their round-trip times [s], the recent ones singly."""
 
     exchanges: int = 0
     retries: int = 0
@@ -109,9 +110,11 @@ class Statistics:
     failed: int = 0
     longest: float = 0.0
     total: float = 0.0
+    recent: deque[float] = field(default_factory=lambda: deque(maxlen=1000))
 
     def answered(self, lasted: float) -> None:
         """Count a reply that took so long [s]."""
+        self.recent.append(lasted)
         self.longest = max(self.longest, lasted)
         self.total += lasted
 

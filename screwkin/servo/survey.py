@@ -12,6 +12,7 @@ from screwkin.servo.line import BusError, DamagedError, LineLostError
 from screwkin.servo.packets import ProtocolName
 from screwkin.servo.profiles import Profile, load_profile, physical, profile_models
 from screwkin.servo.protocols import CODECS
+from screwkin.servo.roundtrip import round_trip
 from screwkin.servo.servo_map import ServoMap
 
 IDS = range(253)
@@ -19,9 +20,13 @@ BAUDS = (1_000_000, 57_600, 115_200, 500_000, 200_000, 250_000, 400_000, 19_200,
 PROTOCOLS = tuple(CODECS)
 
 
+UNREAD = -2
+_ENOUGH = 8  # answers after which the patience follows them
+
+
 @dataclass(frozen=True)
 class AnsweringServo:
-    """A servo that answered: model is its number, -1 where only damaged packets came."""
+    """A servo that answered: model is its number, -1 where only damaged packets came, -2 to a ping alone."""
 
     id: int
     model: int
@@ -41,7 +46,8 @@ class AnsweringServo:
     @property
     def name(self) -> str:
         """The model's name, or its number where there is no profile."""
-        return next(iter(self.profiles), f"model {self.model}")
+        silent = "answers a ping and no readings" if self.model == UNREAD else f"model {self.model}"
+        return next(iter(self.profiles), silent)
 
 
 def scan(
@@ -49,7 +55,8 @@ def scan(
 ) -> list[AnsweringServo]:
     """Every servo that answers at the bus's rate and protocol.
 
-    Where two share an id their answers spoil each other; that is reported as model -1.
+    Where two share an id their answers spoil each other; that is reported as model -1. The bus's patience
+    follows the round trips once there are some.
 
     Raises:
         LineLostError: the port is gone.
@@ -57,6 +64,8 @@ def scan(
     answering = []
     for id in ids:
         progress(id)
+        if not bus.present(id):
+            continue
         try:
             number = bus.ping(id)
             _spoiled(bus, id, number)
@@ -65,7 +74,9 @@ def scan(
         except DamagedError:
             number = -1
         except BusError:
-            continue
+            number = UNREAD
+        if (trip := round_trip(bus)) and trip.count >= _ENOUGH:
+            bus.patience = trip.patience
         answering.append(AnsweringServo(id, number, bus.protocol, bus.baud))
     return answering
 
@@ -98,8 +109,10 @@ def _differences(answering: dict[int, AnsweringServo], servos: ServoMap) -> Iter
         who = f"{joint.joint} (servo {joint.id})"
         servo = answering.get(joint.id)
         if servo is None:
-            yield f"{who} is missing"
+            yield f"{who} is missing; check its power, cable, id and rate (screwkin bus scan --all)"
             continue
+        if servo.model == UNREAD:
+            continue  # its registers say why
         if servo.model < 0:
             yield f"{who} answers with damaged packets: do two servos share its id?"
         elif joint.profile.verified and servo.model != joint.profile.number:
@@ -111,6 +124,21 @@ def _differences(answering: dict[int, AnsweringServo], servos: ServoMap) -> Iter
     for id, servo in sorted(answering.items()):
         if id not in servos.ids:
             yield f"servo {id} ({servo.name}) belongs to no joint of {servos.robot}"
+
+
+def comparable(answering: Sequence[AnsweringServo], servos: ServoMap) -> list[int]:
+    """The joints, by their place in the table, whose servo is the one that the table names."""
+    sound = {
+        servo.id: servo.model
+        for servo in answering
+        if (servo.protocol, servo.baud) == (servos.protocol, servos.baud) and servo.model != -1
+    }
+    return [
+        k
+        for k, joint in enumerate(servos.joints)
+        if joint.id in sound
+        and (sound[joint.id] in (UNREAD, joint.profile.number) or not joint.profile.verified)
+    ]
 
 
 def readings(bus: Bus, profile: Profile, id: int) -> dict[str, float]:

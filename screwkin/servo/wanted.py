@@ -28,7 +28,7 @@ _AS_MADE: Mapping[str, str] = {
     "status_level": "it does not answer everything",
 }
 """Registers that hold what the maker put there, and what a servo does with another value."""
-_FIRST = ("status_level", "operating_mode", "drive_mode")
+FIRST = ("status_level", "operating_mode", "drive_mode")
 """Written first: without answers nothing is confirmed, and a change of mode sets others."""
 _NO_SECOND_ID = 253
 
@@ -79,7 +79,7 @@ def wanted(bounds: Bounds, k: int) -> tuple[Wanted, ...]:
     """
     profile = bounds.profiles[k]
     rows = [row for row in _rows(bounds, k) if row.register in profile.registers]
-    return tuple(sorted(rows, key=lambda row: row.register not in _FIRST))
+    return tuple(sorted(rows, key=lambda row: row.register not in FIRST))
 
 
 def _rows(bounds: Bounds, k: int) -> Iterator[Wanted]:
