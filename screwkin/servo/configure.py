@@ -108,8 +108,7 @@ def reversed_changes(bus: Bus, bounds: Bounds, k: int, backup: SavedServo) -> tu
     return tuple(
         Change(backup.joint, backup.id, profile.register(name), bytes.fromhex(now[name]), bytes.fromhex(text))
         for name, text in backup.registers.items()
-        if name not in _OWN
-        and (now[name] != text or (name == "status_level" and not any(bytes.fromhex(text))))
+        if name not in _OWN and (now[name] != text or (name, text) == mute)
     )
 
 

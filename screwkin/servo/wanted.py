@@ -31,6 +31,7 @@ _AS_MADE: Mapping[str, str] = {
 FIRST = ("status_level", "operating_mode", "drive_mode")
 """Written first: without answers nothing is confirmed, and a change of mode sets others."""
 _NO_SECOND_ID = 253
+_DELAY = 250  # the return delay that plays are planned with: 500 microseconds
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from screwkin.servo.examine import differences
 from screwkin.servo.gate import Bounds
 from screwkin.servo.line import RefusedError
 from screwkin.servo.player import Player
+from screwkin.servo.profiles import profile_models
 from screwkin.servo.servo_map import ServoMap
 from screwkin.servo.virtual.bus import SimulatedClock, VirtualBus
 from screwkin.servo.virtual.robot import virtual_servos
@@ -80,7 +81,7 @@ def bus_with(robot: Robot, changed: dict[str, int] | None = None, id: int = KNEE
     return Bus(line, servos.protocol, servos.baud, clock, port="/dev/ttyUSB0")
 
 
-@pytest.mark.parametrize("model", ["AX-12A", "MX-28", "MX-28-2", "SR-518"])
+@pytest.mark.parametrize("model", profile_models())
 def test_servos_as_they_come_from_the_maker_differ_in_nothing(model):
     assert differences(bus_with(robot_of(model)), robot_of(model)) == ()
 
