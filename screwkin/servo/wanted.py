@@ -107,9 +107,8 @@ def _rows(bounds: Bounds, k: int) -> Iterator[Wanted]:
     yield Wanted("current_limit", made("current_limit"), most("current_limit"), made("current_limit"), weak)
     speed = min(made("velocity_limit"), int(bounds.speed[k]))
     yield Wanted("velocity_limit", speed, most("velocity_limit"), made("velocity_limit"), "it is slower")
-    yield Wanted(
-        "return_delay", 0, made("return_delay"), made("return_delay"), "it answers later than planned"
-    )
+    delay = made("return_delay")
+    yield Wanted("return_delay", 0, max(delay, _DELAY), delay, "it answers later than planned")
     yield Wanted("secondary_id", _NO_SECOND_ID, 255, 255, "it obeys the goals of another servo too")
 
 
