@@ -11,10 +11,10 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, unstack
-from screwkin.dynamics.newton_euler import GRAVITY
 from screwkin.errors import InputError, UnreachableError
 from screwkin.ik.methods import solve_limb
 from screwkin.ik.numeric import ONE_START
+from screwkin.kinematics.mass import GRAVITY
 from screwkin.kinematics.serial_chain import SerialChain, forward
 
 HIGHEST = 0.43 / 0.437

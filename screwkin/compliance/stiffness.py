@@ -22,8 +22,8 @@ from screwkin.compliance.deflection import frames
 from screwkin.compliance.equilibrium import SETTLED, Loaded, equilibrium, first_order
 from screwkin.compliance.springs import StiffnessChoice, joint_stiffness
 from screwkin.compliance.supported import Supported
-from screwkin.dynamics.newton_euler import GRAVITY
 from screwkin.errors import InputError, NoSolutionError, ShapeError, SingularError, UnknownNameError
+from screwkin.kinematics.mass import GRAVITY
 from screwkin.kinematics.positions import link_displacements
 from screwkin.model.robot import Robot, refuse_closures
 from screwkin.model.state import State

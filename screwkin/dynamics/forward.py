@@ -11,9 +11,10 @@ from screwkin.algebra.screws import Wrench
 from screwkin.algebra.se3 import NO_TWIST, Pose, Twist, Vector, leaves
 from screwkin.dynamics import newton_euler
 from screwkin.dynamics.loops import Admitted, refuse_loops
-from screwkin.dynamics.newton_euler import GRAVITY, NO_WRENCH, Bodies
+from screwkin.dynamics.newton_euler import NO_WRENCH, Bodies
 from screwkin.kinematics.formula import formula, refusing
 from screwkin.kinematics.kinds import Joints, Number
+from screwkin.kinematics.mass import GRAVITY
 from screwkin.model.robot import Robot
 
 

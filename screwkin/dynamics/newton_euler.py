@@ -16,9 +16,6 @@ from screwkin.algebra.se3 import ZERO, Pose, Rotation, Twist, Vector, X, Y, Z, b
 from screwkin.kinematics.positions import joint_twists, link_displacements, per_coordinate, tree_rates
 from screwkin.model.robot import Inertia, Robot
 
-GRAVITY = 9.81
-"""Acceleration of free fall [m/s^2], along -z."""
-
 NO_WRENCH = Wrench(ZERO, ZERO)
 
 

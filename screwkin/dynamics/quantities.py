@@ -8,12 +8,13 @@ from screwkin.algebra.screws import Wrench, wrench_at
 from screwkin.algebra.se3 import NO_TWIST, Pose, Twist, Vector
 from screwkin.dynamics import newton_euler
 from screwkin.dynamics.loops import Admitted, actuated_joints, refuse_loops
-from screwkin.dynamics.newton_euler import GRAVITY, Bodies
+from screwkin.dynamics.newton_euler import Bodies
 from screwkin.dynamics.zmp import cart_table_zmp, zmp_from_wrench
 from screwkin.kinematics import mass
 from screwkin.kinematics.body import check_mass
 from screwkin.kinematics.formula import formula, refusing
 from screwkin.kinematics.kinds import Columns, Joints, Number
+from screwkin.kinematics.mass import GRAVITY
 from screwkin.model.robot import Robot
 
 

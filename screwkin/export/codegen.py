@@ -15,11 +15,11 @@ from screwkin.compiler.records import identifier
 from screwkin.compiler.run import run
 from screwkin.compliance import deflection
 from screwkin.dynamics.margin import margin
-from screwkin.dynamics.newton_euler import GRAVITY
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.export.quantities import QUANTITIES, programs
 from screwkin.ik import programs as limbs
 from screwkin.ik.closed import recognised
+from screwkin.kinematics.mass import GRAVITY
 from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.tip_motion import motion_program

@@ -19,8 +19,9 @@ from screwkin.algebra.se3 import (
     unstack,
     vector_from_array,
 )
-from screwkin.dynamics.newton_euler import GRAVITY, Bodies, wrench_and_efforts
+from screwkin.dynamics.newton_euler import Bodies, wrench_and_efforts
 from screwkin.gait.loads import load_distribution
+from screwkin.kinematics.mass import GRAVITY
 from screwkin.model.robot import Robot
 from screwkin.trajectory import Trajectory
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.dynamics.newton_euler import GRAVITY
 from screwkin.errors import InputError
+from screwkin.kinematics.mass import GRAVITY
 
 
 @dataclass(frozen=True, eq=False)

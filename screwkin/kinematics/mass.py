@@ -10,6 +10,9 @@ from screwkin.algebra.se3 import ZERO, Pose, Twist, Vector
 from screwkin.kinematics.positions import per_coordinate
 from screwkin.model.robot import Robot
 
+GRAVITY = 9.81
+"""Acceleration of free fall [m/s^2], along -z."""
+
 Placements = Sequence[Pose | Displacement]
 """Where every link stands, in any frame."""
 

@@ -49,13 +49,16 @@ def spanning_tree(graph: CouplingGraph) -> tuple[int, ...]:
     return tuple(tree)
 
 
+@lru_cache(maxsize=32)
 def cut_set_matrix(graph: CouplingGraph) -> Integers:
     """Fundamental cut-sets (vertices - components, edges): one row for each edge of the spanning tree."""
     tree = list(spanning_tree(graph))
     A = incidence_matrix(graph).astype(float)
     # Rows of the tree's columns have full rank; the least-squares inverse is exact and integer.
     Q = np.linalg.pinv(A[:, tree]) @ A
-    return np.rint(Q).astype(np.int64)
+    Q = np.rint(Q).astype(np.int64)
+    Q.flags.writeable = False
+    return Q
 
 
 @lru_cache(maxsize=32)

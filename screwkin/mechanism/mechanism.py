@@ -6,7 +6,7 @@ joints of no limb. Virtual chains lead from the floor to the waist (floating bas
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -20,7 +20,7 @@ from screwkin.mechanism.chains import SPATIAL, check_chain, held_pose
 from screwkin.mechanism.followers import tip_chain
 from screwkin.mechanism.graph import CouplingGraph
 from screwkin.model.display import html_table, listing
-from screwkin.model.robot import Limb, Robot
+from screwkin.model.robot import Closure, Limb, Robot
 
 FLOOR = "floor"
 WAIST = "waist"
@@ -203,18 +203,23 @@ def virtual_chains(robot: Robot) -> tuple[VirtualChain, ...]:
     return tuple(chains)
 
 
+def welded_links(robot: Robot, closures: Sequence[Closure]) -> dict[str, str]:
+    """The vertex of every link and of the floor, by name: closures weld the links that they join into one."""
+    welded = {name: name for name in (FLOOR, *robot.link_names)}
+    if robot.base == "fixed":
+        welded[robot.base_link] = FLOOR
+    for closure in closures:
+        a, b = sorted((welded[closure.link_a], welded[closure.link_b]), key=lambda name: name != FLOOR)
+        welded = {name: a if vertex == b else vertex for name, vertex in welded.items()}
+    return welded
+
+
 def coupling_graph(robot: Robot, chains: tuple[VirtualChain, ...]) -> CouplingGraph:
     """Vertices and directed edges of the whole mechanism; closures weld the links that they join into one.
 
     Coupled joints come last, in table order.
     """
-    welded = {name: name for name in robot.link_names}
-    if robot.base == "fixed":
-        welded[robot.base_link] = FLOOR
-    for closure in robot.closures:
-        a, b = sorted((welded[closure.link_a], welded[closure.link_b]), key=lambda name: name != FLOOR)
-        welded = {name: a if vertex == b else vertex for name, vertex in welded.items()}
-
+    welded = welded_links(robot, robot.closures)
     edges: list[tuple[str, str, str]] = []
     following: dict[int, tuple[str, str, str]] = {}
     taken: set[int] = set()

@@ -188,13 +188,13 @@ def _solve(A: Array, b: Array) -> tuple[Array, Array]:
             least = xp.linalg.pinv(stop_gradient(xp.where(here, A, eye)), rcond=RANK_TOLERANCE) @ b
             x = xp.where(here, least, x)
         elif singular.any():
-            x[singular] = _least_squares(A[singular], b[singular])[0]
+            x[singular] = least_squares(A[singular], b[singular])[0]
         return x[..., 0], singular
-    x, sigma = _least_squares(A, b)
+    x, sigma = least_squares(A, b)
     return x[..., 0], sigma[..., -1] < RANK_TOLERANCE
 
 
-def _least_squares(A: Array, b: Array) -> tuple[Array, Array]:
+def least_squares(A: Array, b: Array) -> tuple[Array, Array]:
     """The shortest x (..., n, 1) of least squares, and the singular values of A."""
     U, sigma, V = np.linalg.svd(A, full_matrices=False)
     regular = sigma > RANK_TOLERANCE * sigma[..., :1]

@@ -14,10 +14,10 @@ from screwkin.compiler.graph import FUNCTIONS
 from screwkin.compiler.program import Recorder
 from screwkin.compiler.run import chosen_path, python_function, run
 from screwkin.compiler.series import TURNS
-from screwkin.dynamics.newton_euler import GRAVITY
 from screwkin.dynamics.quantities import balance
 from screwkin.ik.closed import recognised
 from screwkin.kinematics import body
+from screwkin.kinematics.mass import GRAVITY
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.tip_motion import follows, motion_program
 from tests.kinematics.machines import random_state, random_tree

@@ -13,7 +13,7 @@ from screwkin.compiler.run import run
 from screwkin.compliance import deflection, equilibrium
 from screwkin.compliance.equilibrium import Loaded, first_order
 from screwkin.compliance.stiffness import static_deflection
-from screwkin.dynamics.newton_euler import GRAVITY
+from screwkin.kinematics.mass import GRAVITY
 from tests.kinematics.machines import random_state, random_tree
 
 PATHS = ["python", "numpy", *(["C"] if native.compiler() else [])]

@@ -15,8 +15,8 @@ from screwkin.algebra.se3 import as_array, pose_from_array, unstack
 from screwkin.compliance.springs import joint_stiffness
 from screwkin.compliance.stiffness import cartesian_compliance, cartesian_stiffness, static_deflection
 from screwkin.compliance.supported import Supported
-from screwkin.dynamics.newton_euler import GRAVITY
 from screwkin.errors import InputError, NoSolutionError, ShapeError, SingularError, UnknownNameError
+from screwkin.kinematics.mass import GRAVITY
 from screwkin.model.robot import Robot
 from screwkin.model.table import parse_robot
 from tests.kinematics.machines import random_tree

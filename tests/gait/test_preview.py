@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from screwkin.dynamics.newton_euler import GRAVITY
 from screwkin.errors import InputError
 from screwkin.gait.preview import follow_reference, preview_gains
+from screwkin.kinematics.mass import GRAVITY
 
 
 def test_gains_of_the_published_setting() -> None:

@@ -17,8 +17,8 @@ from screwkin.compliance.deflection import newton_step
 from screwkin.compliance.equilibrium import Loaded
 from screwkin.compliance.stiffness import static_deflection
 from screwkin.dynamics.margin import support_margin
-from screwkin.dynamics.newton_euler import GRAVITY
 from screwkin.ik.reach import reach
+from screwkin.kinematics.mass import GRAVITY
 from tests.kinematics.machines import random_state, random_tree
 
 BATCHES = (7, 999, 5000)
