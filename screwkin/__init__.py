@@ -26,11 +26,13 @@ if TYPE_CHECKING:
         link_poses,
         tip_poses,
     )
+    from screwkin.mechanism.actions import action_matrix
     from screwkin.mechanism.choice import closed_mechanism
     from screwkin.mechanism.closure import close_loops
     from screwkin.mechanism.mechanism import Mechanism
     from screwkin.mechanism.quantities import network_matrix, secondary_rates, virtual_motion
     from screwkin.mechanism.singularity import singularity_report
+    from screwkin.mechanism.statics import static_forces
     from screwkin.mechanism.tip_motion import joint_rates
     from screwkin.model.library import robot_names
     from screwkin.model.robot import Robot
@@ -52,11 +54,13 @@ _HOMES = {
     "ik.limb": "limb_ik",
     "ik.pose": "solve_pose",
     "kinematics.body": "center_of_mass com_jacobian frame_pose jacobian link_poses tip_poses",
+    "mechanism.actions": "action_matrix",
     "mechanism.choice": "closed_mechanism",
     "mechanism.closure": "close_loops",
     "mechanism.mechanism": "Mechanism",
     "mechanism.quantities": "network_matrix secondary_rates virtual_motion",
     "mechanism.singularity": "singularity_report",
+    "mechanism.statics": "static_forces",
     "mechanism.tip_motion": "joint_rates",
     "model.library": "robot_names",
     "model.robot": "Robot",
@@ -76,6 +80,7 @@ __all__ = [
     "State",
     "Trajectory",
     "Validation",
+    "action_matrix",
     "bind",
     "center_of_mass",
     "close_loops",
@@ -103,6 +108,7 @@ __all__ = [
     "secondary_rates",
     "singularity_report",
     "solve_pose",
+    "static_forces",
     "tip_poses",
     "validate",
     "virtual_motion",

@@ -49,10 +49,36 @@ def point_of(text: str | None, option: str) -> tuple[float, float, float] | None
     """
     if text is None:
         return None
-    try:
-        x, y, z = (float(part) for part in text.split(","))
-    except ValueError:
-        raise InputError(f"{option} {text!r} is no point; write three numbers in m, as 50,0,0") from None
-    if not all(map(math.isfinite, (x, y, z))):
-        raise InputError(f"{option} {text!r} holds NaN or infinity; write three finite numbers in m")
+    x, y, z = numbers_of(text, option, (3,), "point", "three numbers in m, as 50,0,0")
     return x, y, z
+
+
+def numbers_of(
+    text: str,
+    option: str,
+    counts: tuple[int, ...],
+    what: str = "list of numbers",
+    write: str = "",
+) -> list[float]:
+    """Finite numbers written with commas between them.
+
+    Args:
+        text: ``X,Y,...``.
+        option: its name in messages.
+        counts: how many there may be.
+        what: they are, in messages.
+        write: what to write instead.
+
+    Raises:
+        InputError: they are not.
+    """
+    write = write or f"{' or '.join(map(str, counts))} numbers, with commas between them"
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) not in counts:
+        raise InputError(f"{option} {text!r} is no {what}; write {write}")
+    if not all(map(math.isfinite, values)):
+        raise InputError(f"{option} {text!r} holds NaN or infinity; write {write}")
+    return values

@@ -190,13 +190,13 @@ def _solve(A: Array, b: Array) -> tuple[Array, Array]:
         elif singular.any():
             x[singular] = least_squares(A[singular], b[singular])[0]
         return x[..., 0], singular
-    x, sigma = least_squares(A, b)
+    x, sigma, _ = least_squares(A, b)
     return x[..., 0], sigma[..., -1] < RANK_TOLERANCE
 
 
-def least_squares(A: Array, b: Array) -> tuple[Array, Array]:
-    """The shortest x (..., n, 1) of least squares, and the singular values of A."""
+def least_squares(A: Array, b: Array) -> tuple[Array, Array, Array]:
+    """The shortest x (..., n, 1) of least squares, the singular values of A, and V^T of its factorisation."""
     U, sigma, V = np.linalg.svd(A, full_matrices=False)
     regular = sigma > RANK_TOLERANCE * sigma[..., :1]
     scale = np.where(regular, 1 / np.where(regular, sigma, 1.0), 0.0)
-    return V.swapaxes(-1, -2) @ (scale[..., None] * (U.swapaxes(-1, -2) @ b)), sigma
+    return V.swapaxes(-1, -2) @ (scale[..., None] * (U.swapaxes(-1, -2) @ b)), sigma, V

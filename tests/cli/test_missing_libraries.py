@@ -50,6 +50,7 @@ VERBS = {
     "info": "info poppy12",
     "table": "table linkages/four-bar",
     "table --symbolic": "table linkages/four-bar --symbolic",
+    "forces": "forces bioloid --weights",
     "convert": "convert poppy12 poppy.urdf",
     "convert back": "convert poppy.urdf poppy.csv",
     "compare": "compare poppy12 --samples 5 --rounds 1 -o compare",

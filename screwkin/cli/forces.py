@@ -1,0 +1,198 @@
+"""``screwkin forces``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+
+from screwkin.algebra.arrays import Array
+from screwkin.cli.options import AsJson, numbers_of
+from screwkin.cli.output import aligned, print_json
+from screwkin.errors import InputError
+from screwkin.mechanism.action_choice import ActionChoice, action_choice
+from screwkin.mechanism.choice import closed_mechanism
+from screwkin.mechanism.statics import StaticForces, static_forces
+from screwkin.model.display import listing
+from screwkin.model.robot import Robot
+from screwkin.model.state import State, home
+from screwkin.model.table import load_robot
+
+
+def forces(
+    robot: Annotated[
+        str,
+        typer.Argument(
+            metavar="ROBOT", help="A bundled robot's name, or a .toml, .urdf, MJCF .xml or DH .csv file."
+        ),
+    ],
+    load: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUES",
+            help="JOINT=EFFORT, or LINK=FX,FY,FZ at its origin, or LINK=FX,FY,FZ@X,Y,Z at a world point, or "
+            "LINK=MX,MY,MZ,FX,FY,FZ about the world's origin [N m, N, m]; may be repeated.",
+        ),
+    ] = None,
+    weights: Annotated[bool, typer.Option("--weights", help="Add the weights of the links.")] = False,
+    down: Annotated[
+        str | None,
+        typer.Option(metavar="X,Y,Z", help="Base axes' direction in which weights pull; default 0,0,-1."),
+    ] = None,
+    impose: Annotated[
+        list[str] | None,
+        typer.Option(metavar="ACTION=VALUE", help="Impose an action, as object.fy=-5; may be repeated."),
+    ] = None,
+    active: Annotated[
+        list[str] | None, typer.Option(help="A joint with an effort; may be repeated. Default: the drives.")
+    ] = None,
+    contact: Annotated[
+        list[str] | None,
+        typer.Option(help="A tip on the floor or a held closure; may be repeated. Default: the soles."),
+    ] = None,
+    posture: Annotated[str | None, typer.Option(help="A posture of the table; default home.")] = None,
+    as_json: AsJson = False,
+) -> int:
+    """Statics by Davies' method: efforts, pin forces and contact wrenches that balance loads."""
+    table = load_robot(robot)
+    return _statics(table, posture, load or [], weights, down, impose or [], active, contact, as_json)
+
+
+def _statics(
+    robot: Robot,
+    posture: str | None,
+    load: Sequence[str],
+    weights: bool,
+    down: str | None,
+    impose: Sequence[str],
+    active: Sequence[str] | None,
+    contact: Sequence[str] | None,
+    as_json: bool,
+) -> int:
+    """Equilibrium of a robot in a posture."""
+    loads, imposed = _loads(load), _imposed(impose)
+    if not (loads or imposed or weights):
+        raise InputError("nothing loads it; add --load NAME=VALUES, --impose ACTION=VALUE or --weights")
+    mechanism = closed_mechanism(robot)
+    state = _turned(home(robot, posture or _first_posture(robot)), down)
+    result = static_forces(mechanism, state, loads, imposed, weights=weights, active=active, contacts=contact)
+    choice = action_choice(mechanism, None, result.system.active, result.system.contacts)
+    if as_json:
+        print_json(_data(robot, result, choice))
+    else:
+        print(_text(robot, result, choice))
+    return 0
+
+
+def _first_posture(robot: Robot) -> str:
+    names = [posture.name for posture in robot.postures]
+    return "home" if "home" in names or not names else names[0]
+
+
+def _loads(texts: Sequence[str]) -> dict[str, Any]:
+    """Loads by name: an effort, a force, or a wrench about the world's origin."""
+    loads: dict[str, Any] = {}
+    for text in texts:
+        name, values = _assignment("--load", text, "rocker=10")
+        before, _, place = values.partition("@")
+        numbers = numbers_of(before, f"--load {name}", (1, 3, 6))
+        value: Any = numbers[0] if len(numbers) == 1 else np.array(numbers)
+        if place:
+            if len(numbers) != 3:
+                raise InputError(
+                    f"--load {text!r}: a place belongs to a force of three numbers, FX,FY,FZ@X,Y,Z"
+                )
+            value = np.concatenate([np.cross(numbers_of(place, f"--load {name}", (3,)), value), value])
+        if name in loads:
+            raise InputError(f"--load {name} is given twice; add the two up")
+        loads[name] = value
+    return loads
+
+
+def _imposed(texts: Sequence[str]) -> dict[str, float]:
+    imposed: dict[str, float] = {}
+    for text in texts:
+        name, value = _assignment("--impose", text, "object.fy=-5")
+        if name in imposed:
+            raise InputError(f"--impose {name} is given twice; once is enough")
+        (imposed[name],) = numbers_of(value, f"--impose {name}", (1,))
+    return imposed
+
+
+def _assignment(option: str, text: str, example: str) -> tuple[str, str]:
+    name, equals, value = (part.strip() for part in text.partition("="))
+    if not (equals and name and value):
+        raise InputError(f"{option} {text!r} is no assignment; write {option} {example}")
+    return name, value
+
+
+def _turned(state: State, down: str | None) -> State:
+    """The state with its base turned so that a direction of base axes points down."""
+    if down is None:
+        return state
+    d = np.array(numbers_of(down, "--down", (3,)))
+    if not np.linalg.norm(d) > 0:
+        raise InputError(f"--down {down!r} is no direction; write three numbers, as 0,-1,0")
+    up = -d / np.linalg.norm(d)
+    side = np.cross(up, np.eye(3)[np.abs(up).argmin()])
+    side /= np.linalg.norm(side)
+    T = np.array(state.T_world_base)
+    T[:3, :3] = [side, np.cross(up, side), up]
+    return State(T, state.q)
+
+
+def _data(robot: Robot, result: StaticForces, choice: ActionChoice) -> dict[str, Any]:
+    pairs = list(zip(result.names, result.values, result.decided, strict=True))
+    contacts = [float(np.linalg.norm(result.force(name))) for name in result.system.contacts]
+    return {
+        "robot": robot.name,
+        "actions": {name: value for name, value, _ in pairs},
+        "undecided": [name for name, _, decided in pairs if not decided],
+        "efforts": result.efforts,
+        "wrenches": {name: result.wrench(name) for name in result.couplings},
+        "action_matrix": [6 * len(result.system.cut_sets), len(result.names)],
+        "rank": choice.rank,
+        "degree": choice.degree,
+        "primary": choice.primary,
+        "redundant": dict(zip(choice.redundant, choice.meaning, strict=True)),
+        "residual": result.residual,
+        "max_effort": max((abs(float(x)) for x in result.efforts.values()), default=0.0),
+        "max_contact_force": max(contacts, default=0.0),
+    }
+
+
+def _text(robot: Robot, result: StaticForces, choice: ActionChoice) -> str:
+    system = result.system
+    rows = [("coupling", "effort", "force x, y, z [N], world axes", "size [N]", "")]
+    free = dict(zip(result.names, ~result.decided, strict=True))
+    sliding = {joint.name for joint in robot.tree if joint.screw.is_translation}
+    for name in result.couplings:
+        own = [action for action in result.names if action == name or action.startswith(f"{name}.")]
+        unit = "N" if name in sliding else "N m"
+        effort = f"{round(float(result[name]), 4) + 0.0:.4f} {unit}" if name in result.names else ""
+        force = result.force(name)
+        open_ones = [action.rpartition(".")[2] for action in own if free[action]]
+        mark = (
+            f"undecided: {' '.join(open_ones) if len(open_ones) < len(own) else 'all'}" if open_ones else ""
+        )
+        rows.append((name, effort, _three(force), f"{np.linalg.norm(force):.4f}", mark))
+    facts = [
+        ("action matrix A", f"{6 * len(system.cut_sets)} x {len(result.names)}, rank {choice.rank}"),
+        ("degree of constraint", f"{choice.degree}: {', '.join(choice.primary) or 'nothing is left over'}"),
+        ("redundant constraints", str(len(choice.redundant))),
+        *((f"  {name}", text) for name, text in zip(choice.redundant, choice.meaning, strict=True)),
+        ("efforts by", listing(system.active) or "none"),
+        ("contacts", ", ".join(system.contacts) or "none"),
+    ]
+    parts = [f"{robot.name}: equilibrium", aligned(rows, "  "), aligned(facts, "  ")]
+    if not result.decided.all():
+        parts.append(
+            "undecided: equilibrium leaves it open; shown is the choice of least squares (--impose sets one)"
+        )
+    return "\n".join(parts)
+
+
+def _three(values: Array) -> str:
+    return "  ".join(f"{round(float(x), 4) + 0.0:9.4f}" for x in values)
