@@ -107,8 +107,14 @@ def _target(program: Program) -> str | None:
     if handler is None:
         return None
     name = f"screwkin.{program.name}.{key[:16]}"
-    jax.ffi.register_ffi_target(name, jax.ffi.pycapsule(handler), platform="cpu")
+    if name not in _REGISTERED:
+        jax.ffi.register_ffi_target(name, jax.ffi.pycapsule(handler), platform="cpu")
+        _REGISTERED.add(name)
     return name
+
+
+_REGISTERED: set[str] = set()
+"""Names of handlers that XLA knows: programs of one text share one, which may be registered once."""
 
 
 def source(program: Program) -> str:

@@ -53,6 +53,16 @@ def test_batches_have_any_shape_and_broadcast(program):
 
 
 @compiled
+def test_robots_of_one_text_share_their_handler():
+    text, found = sk.load_robot("poppy12").text, []
+    for _ in range(2):
+        robot = sk.robot_from_text(text, name="twin")
+        f = xla_call.function(body.center_of_mass.program(robot))
+        found.append(np.asarray(jax.jit(f)(*inputs_of(3))[0]))
+    np.testing.assert_array_equal(*found)
+
+
+@compiled
 def test_vmap_adds_its_axis_to_the_batch(program):
     T, q = inputs_of(5)
     f = xla_call.function(program)
