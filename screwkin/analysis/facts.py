@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from screwkin.algebra.se3 import UNTURNED, ZERO, Vector
+from screwkin.algebra.se3 import IDENTITY, ZERO, Vector
 from screwkin.mechanism.choice import closed_mechanism, mobility_at
 from screwkin.mechanism.mechanism import Mechanism
 from screwkin.mechanism.network import coupling_twists, network_of_twists
@@ -88,7 +88,7 @@ def facts_of(
     q = list(reference_posture(robot) if posture is None else robot.posture(posture).q)
     about = ZERO if point is None else Vector(*point) - Vector(*place)
     at_waist, N = (
-        network_of_twists(mechanism, coupling_twists(mechanism, UNTURNED, q, p)) for p in (ZERO, about)
+        network_of_twists(mechanism, coupling_twists(mechanism, IDENTITY, q, p)) for p in (ZERO, about)
     )
     driven = set(mechanism.primary) if robot.closures else set(robot.joint_names)
     mobility = int(mobility_at(mechanism, at_waist)) if len(N) else len(mechanism.couplings)

@@ -164,7 +164,7 @@ class Definition:
         given: list[Given] = []
         for name, kind in self.kinds.items():
             if name not in self.defaults or name in optional:
-                parts = kind.parts and kind.parts(robot_of(subject), name, True)[0]
+                parts = kind.parts and kind.parts(subject, name, True)[0]
                 given.append((name, parts) if parts is not None else name)
         return tuple(given)
 
@@ -241,7 +241,7 @@ class Definition:
                 given.append(name)
                 arrays.append(value)
             else:
-                parts, own = kind.parts(robot, name, value)
+                parts, own = kind.parts(subject, name, value)
                 given.append((name, parts))
                 arrays += own
         return tuple(given), arrays

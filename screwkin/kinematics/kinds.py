@@ -28,7 +28,7 @@ TipTwists = Annotated[Mapping[str, Twist], "tips"]
 Columns = Annotated[list[Any], "columns"]
 """A result: a matrix by its columns, each a list, a vector or a twist."""
 
-Parts = Callable[[Robot, str, Any], tuple[tuple[Argument, ...], list[Any]]]
+Parts = Callable[[Any, str, Any], tuple[tuple[Argument, ...], list[Any]]]
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Kind:
         text: its shape in a docstring.
         shape: trailing shape for a robot.
         record: the record of its arrays' scalars.
-        parts: of an argument that is a mapping, the arrays that it consists of.
+        parts: of an argument that is a mapping, the arrays that it consists of, for a robot or mechanism.
     """
 
     text: str
@@ -60,29 +60,35 @@ def _one(record: Callable[[Sequence[Scalar]], Any]) -> Callable[..., Any]:
     return lambda arguments, scalars: record(scalars[0])
 
 
-def _tip_arrays(robot: Robot, name: str, value: Any) -> tuple[tuple[Argument, ...], list[Any]]:
-    """Twists of the tips that are given; for a program (True) six numbers from six joints on, else three."""
+def _tip_arrays(subject: Any, name: str, value: Any) -> tuple[tuple[Argument, ...], list[Any]]:
+    """Twists of the tips that are given; for a program (True) six numbers from six joints on, else three.
+
+    Of a mechanism also those of its further chains.
+    """
+    robot: Robot = getattr(subject, "robot", subject)
+    added = [chain.name for chain in getattr(subject, "added", ())]
     if value is not True:
         if type(value) is not dict and not isinstance(value, Mapping):
             raise InputError(f"{name} is a mapping from names of tips to arrays, not {type(value).__name__}")
-        known = robot.tip_names
+        known = (*robot.tip_names, *added)
         for tip in value:
             if tip not in known:
                 raise UnknownNameError("tip", str(tip), known)
     arguments: list[Argument] = []
     arrays: list[Any] = []
     names: set[str] = set()
-    for limb in robot.limbs:
+    joints = {limb.tip: len(robot.path_to(limb.link)) for limb in robot.limbs} | dict.fromkeys(added, 6)
+    for tip, count in joints.items():
         if value is True:
-            size = 6 if len(robot.path_to(limb.link)) >= 6 else 3
-        elif limb.tip in value:
-            size = 3 if _length(value[limb.tip]) == 3 else 6
-            arrays.append(value[limb.tip])
+            size = 6 if count >= 6 else 3
+        elif tip in value:
+            size = 3 if _length(value[tip]) == 3 else 6
+            arrays.append(value[tip])
         else:
             continue
-        argument = _tip_argument(name, limb.tip, size, 0)
+        argument = _tip_argument(name, tip, size, 0)
         if argument.name in names:  # tips that differ in signs only
-            argument = _tip_argument(name, limb.tip, size, len(names))
+            argument = _tip_argument(name, tip, size, len(names))
         names.add(argument.name)
         arguments.append(argument)
     return tuple(arguments), arrays

@@ -14,16 +14,17 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.algebra.se3 import UNTURNED, norm, rotation_log
+from screwkin.algebra.se3 import Pose, norm, rotation_log
 from screwkin.compiler.program import kept
 from screwkin.errors import InputError, SingularError, expect, one_of
 from screwkin.kinematics.positions import link_displacements
 from screwkin.mechanism.graph import CouplingGraph
-from screwkin.mechanism.mechanism import Mechanism, VirtualChain, unchosen
+from screwkin.mechanism.mechanism import WAIST, Mechanism, unchosen
 from screwkin.mechanism.network import coupling_twists, network_of_twists
 from screwkin.mechanism.scaling import characteristic_length, referenced
+from screwkin.mechanism.virtual_chain import VirtualChain
 from screwkin.model.robot import Robot
-from screwkin.model.state import reference_posture
+from screwkin.model.state import reference_base, reference_posture
 
 RANK_TOLERANCE = 1e-6
 """Smallest singular value, relative to the largest, of length-normalised screws still independent."""
@@ -58,13 +59,15 @@ def independent(N: Array, order: Sequence[int]) -> list[int]:
 def preference(mechanism: Mechanism) -> list[int]:
     """Columns in the order in which they would rather be secondary.
 
-    With virtual chains: joints of one limb, then the rotations of tips, of each chain the last first, then
-    joints that limbs share, then the translations of tips, the waist last; a joint that no circuit needs
-    never follows. Without: the last joint of the table first, so that the first ones drive.
+    Further chains before all others: they measure, and only who names them primary imposes them. With
+    virtual chains: joints of one limb, then the rotations of tips, of each chain the last first, then joints
+    that limbs share, then the translations of tips, the waist last; a joint that no circuit needs never
+    follows. Without: the last joint of the table first, so that the first ones drive.
     """
     real = [mechanism.position[name] for name in mechanism.robot.joint_names]
+    measuring = [mechanism.position[name] for chain in mechanism.added for name in chain.names]
     if not mechanism.chains:
-        return real[::-1]
+        return measuring + real[::-1]
     robot = mechanism.robot
     users = Counter(i for limb in robot.limbs for i in {robot.gears[k][0] for k in robot.path_to(limb.link)})
     shared = [column for i, column in enumerate(real) if users[i] > 1]
@@ -74,24 +77,29 @@ def preference(mechanism: Mechanism) -> list[int]:
     turning = [n for chain in tips for n in reversed(chain.names) if n.split(".")[1][0] == "r"]
     moving = [n for chain in tips for n in chain.names if n.split(".")[1][0] == "p"]
     rotations, others = ([mechanism.position[n] for n in names] for names in (turning, (*moving, *waist)))
-    return own + rotations + shared + others
+    return measuring + own + rotations + shared + others
 
 
-def closed_mechanism(robot: Robot, primary: Sequence[str] | None = None) -> Mechanism:
+def closed_mechanism(
+    robot: Robot, primary: Sequence[str] | None = None, chains: Sequence[VirtualChain] = ()
+) -> Mechanism:
     """The robot as one closed mechanism, its choice of primary couplings checked at the home posture.
 
     Args:
         robot: a humanoid (virtual chains to the waist and the tips) or any table with closures.
         primary: names of the couplings to impose; default: the virtual chains impose, real joints follow,
             and where a limb has fewer than six joints the rotations of its tip's chain follow too.
+        chains: further virtual chains, from any link to any other; they measure unless their couplings are
+            primary. The mechanism is examined at the home posture, where those of fewer than six pairs must
+            reach their ends.
 
     Returns:
         Mechanism with ``couplings links circuits mobility primary secondary``.
 
     Raises:
-        UnknownNameError: a primary name is no coupling.
+        UnknownNameError: a primary name is no coupling, or an end of a chain no frame of the robot.
         InputError: a name twice; too few or too many primary couplings, with the ones to move; or a closure
-            that is open at the home posture, where ranks would mean nothing.
+            or a chain that is open at the home posture, where ranks would mean nothing.
         SingularError: the right number, but dependent; says which to exchange.
 
     Example:
@@ -104,18 +112,29 @@ def closed_mechanism(robot: Robot, primary: Sequence[str] | None = None) -> Mech
     """
     expect(robot, Robot, "robot", 'load_robot("NAME")')
     named = primary if primary is None or isinstance(primary, str) else tuple(primary)
-    return Mechanism(robot, *_checked(robot, named))
+    added = (chains,) if isinstance(chains, VirtualChain) else tuple(chains)
+    for chain in added:
+        expect(chain, VirtualChain, "chains", "a list of VirtualChain(name, couplings, end, start)")
+    return Mechanism(robot, *_checked(robot, named, added))
 
 
-Parts = tuple[tuple[VirtualChain, ...], CouplingGraph, tuple[str, ...], tuple[str, ...], int]
+Parts = tuple[
+    tuple[VirtualChain, ...],
+    CouplingGraph,
+    tuple[str, ...],
+    tuple[str, ...],
+    int,
+    tuple[VirtualChain, ...],
+]
 
 
 @kept
-def _checked(robot: Robot, primary: Sequence[str] | None) -> Parts:
+def _checked(robot: Robot, primary: Sequence[str] | None, added: tuple[VirtualChain, ...]) -> Parts:
     """The parts of ``closed_mechanism`` besides the robot."""
-    bare, q = unchosen(robot), reference_posture(robot)
-    _check_closed(robot, q)
-    N = referenced(bare, network_of_twists(bare, coupling_twists(bare, UNTURNED, q)))
+    _check_names(robot, added)
+    bare, q, T = unchosen(robot, added), reference_posture(robot), reference_base(robot)
+    _check_closed(bare, T, q)
+    N = referenced(bare, network_of_twists(bare, coupling_twists(bare, T, q)))
     mobility = len(bare.couplings) - int(rank(N))
     if primary is None:
         columns = set(independent(N, preference(bare)))
@@ -128,7 +147,7 @@ def _checked(robot: Robot, primary: Sequence[str] | None) -> Parts:
         mobility=mobility,
     )
     _check(chosen, N)
-    return bare.chains, bare.graph, chosen.primary, chosen.secondary, mobility
+    return bare.chains, bare.graph, chosen.primary, chosen.secondary, mobility, added
 
 
 def _wanted(bare: Mechanism, primary: Sequence[str]) -> set[str]:
@@ -143,20 +162,42 @@ def _wanted(bare: Mechanism, primary: Sequence[str]) -> set[str]:
     return wanted
 
 
-def _check_closed(robot: Robot, q: Sequence[float]) -> None:
-    """Every closure's two frames coincide at q, to ``CLOSED`` times the robot's size and in rad."""
+def _check_names(robot: Robot, added: Sequence[VirtualChain]) -> None:
+    """Every further chain has a name of its own."""
+    taken = {WAIST, *robot.tip_names}
+    for chain in added:
+        if chain.name in taken:
+            raise InputError(f"chain {chain.name}: another chain has this name; give every chain its own")
+        taken.add(chain.name)
+
+
+def _check_closed(mechanism: Mechanism, T: Pose, q: Sequence[float]) -> None:
+    """The two ends of every closure and further chain coincide, to ``CLOSED`` times the size and in rad."""
+    robot = mechanism.robot
     carried = dict(zip(robot.link_names, link_displacements(robot, list(q)), strict=True))
     length = characteristic_length(robot)
+    where = "at the posture where the mechanism is examined"
     for closure in robot.closures:
         a, b = carried[closure.link_a] @ closure.frame_a, carried[closure.link_b] @ closure.frame_b
-        gap, turn = float(norm(b.p - a.p)), float(norm(rotation_log(b.R @ a.R.T)))
-        if gap > CLOSED * length or turn > CLOSED:
+        if gap := _gap(a, b, length):
             raise InputError(
-                f"{robot.name}: closure {closure.name} is open by {1e3 * gap:.3g} mm and "
-                f"{np.degrees(turn):.3g} deg at the posture where the mechanism is examined; give a posture "
-                "home that closes it, by formulas or to nine digits (mechanism.closure.nearest_closed finds "
-                "one)"
+                f"{robot.name}: closure {closure.name} is open by {gap} {where}; give a posture home that "
+                "closes it, by formulas or to nine digits (mechanism.closure.nearest_closed finds one)"
             )
+    for chain in mechanism.added:
+        start, end = chain.ends(robot, T, carried)
+        if gap := _gap(end, chain.reached(start, chain.coordinates(start, end)), length):
+            raise InputError(
+                f"{robot.name}: chain {chain.name} of {', '.join(chain.couplings)} misses its end by {gap} "
+                f"{where}; place its frames so that it reaches, or take six pairs and impose the others"
+            )
+
+
+def _gap(a: Pose, b: Pose, length: float) -> str:
+    """How far two poses are apart, in words; nothing where they coincide."""
+    gap, turn = float(norm(b.p - a.p)), float(norm(rotation_log(b.R @ a.R.T)))
+    apart = gap > CLOSED * length or turn > CLOSED
+    return f"{1e3 * gap:.3g} mm and {np.degrees(turn):.3g} deg" if apart else ""
 
 
 def _check(mechanism: Mechanism, N: Array) -> None:

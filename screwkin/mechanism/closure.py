@@ -19,6 +19,7 @@ from screwkin.algebra.se3 import (
     ZERO,
     Pose,
     Twist,
+    Vector,
     as_array,
     pose_from_array,
     rotation_log,
@@ -64,6 +65,9 @@ def coordinates_from_state(mechanism: Mechanism, T: Pose, q: Sequence[Scalar]) -
         body = T if chain.limb is None else T @ pose_in_base(robot, D, chain.limb.tip)
         coordinates = chain_coordinates(chain.couplings, body, mechanism.held(chain, T))
         values |= zip(chain.names, coordinates, strict=True)
+    carried = dict(zip(robot.link_names, D, strict=True))
+    for chain in mechanism.added:
+        values |= zip(chain.names, chain.coordinates(*chain.ends(robot, T, carried)), strict=True)
     return [values[name] for name in mechanism.couplings]
 
 
@@ -85,19 +89,23 @@ def closure_errors(mechanism: Mechanism, coordinates: Sequence[Scalar], fixed: P
     base = base_pose(mechanism, coordinates, fixed)
     D = link_displacements(robot, q)
     carried = dict(zip(robot.link_names, D, strict=True))
-    ends: list[tuple[Pose, Pose]] = []
+    ends: list[tuple[Pose, Pose, Vector]] = []
     for chain in mechanism.chains:
         if chain.limb is not None:
             values = [coordinates[mechanism.position[name]] for name in chain.names]
             end = chain_pose(chain.couplings, values, mechanism.held(chain, base))
-            ends.append((base @ pose_in_base(robot, D, chain.limb.tip), end))
+            ends.append((base @ pose_in_base(robot, D, chain.limb.tip), end, base.p))
     for closure in robot.closures:
         a, b = carried[closure.link_a] @ closure.frame_a, carried[closure.link_b] @ closure.frame_b
-        ends.append((base @ a, base @ b))
+        ends.append((base @ a, base @ b, base.p))
+    for chain in mechanism.added:
+        start, end = chain.ends(robot, base, carried)
+        values = [coordinates[mechanism.position[name]] for name in chain.names]
+        ends.append((end, chain.reached(start, values), ZERO))
     errors = []
-    for a, b in ends:
+    for a, b, origin in ends:
         gap = Twist(rotation_log(b.R @ a.R.T), b.p - a.p)
-        errors.append(at(base.p - a.p, gap))
+        errors.append(at(origin - a.p, gap))
     return errors
 
 
@@ -146,8 +154,7 @@ def close_loops(mechanism: Mechanism, guess: State, imposed: Mapping[str, Array]
             len(samples), -1
         )
         joints = [scalars[mechanism.position[name]] for name in mechanism.robot.joint_names]
-        turned = base_pose(mechanism, scalars, fixed).R
-        twists = coupling_twists(mechanism, turned, joints, ZERO)
+        twists = coupling_twists(mechanism, base_pose(mechanism, scalars, fixed), joints, ZERO, scalars)
         N = network_of_twists(mechanism, twists, (len(samples),), mechanism.closing_matrix)
         return missing * scale, N[..., columns] * scale[:, None]
 

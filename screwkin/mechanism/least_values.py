@@ -9,7 +9,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.screws import Displacement, Screw, at
-from screwkin.algebra.se3 import ZERO, Pose, Rotation, Twist
+from screwkin.algebra.se3 import ZERO, Pose, Twist
 from screwkin.algebra.singular_values import TRUSTED, least_singular_value
 from screwkin.compiler.program import Program, Recorder, kept
 from screwkin.compiler.records import identifier, pose_input
@@ -21,12 +21,9 @@ from screwkin.mechanism.limb_motion import seen_screws
 from screwkin.mechanism.mechanism import Mechanism, mechanism_of
 from screwkin.mechanism.network import coupling_twists
 from screwkin.mechanism.rates import block_rows, flat, network_of
-from screwkin.mechanism.scaling import (
-    characteristic_length,
-    referenced,
-    weighed,
-)
+from screwkin.mechanism.scaling import characteristic_length, referenced, weighed
 from screwkin.mechanism.secondary import formula_blocks, tip_of
+from screwkin.mechanism.virtual_chain import VirtualChain
 from screwkin.model.robot import Robot
 
 
@@ -48,7 +45,7 @@ def least_values(mechanism: Mechanism, T_world_base: Array, q: Array) -> Array:
     by_formula = _certifiable(mechanism)
     others = [k for k in range(len(mechanism.blocks)) if k not in by_formula]
     if by_formula:
-        program = block_values(mechanism.robot, mechanism.primary, mechanism.secondary)
+        program = block_values(mechanism.robot, *mechanism.choice)
         result = run(program, {"T_world_base": T, "q": q})
         least[:, by_formula] = result["least"]
         uncertified = np.flatnonzero(~(result["error"] <= TRUSTED).all(axis=1))
@@ -83,28 +80,34 @@ def _certifiable(mechanism: Mechanism) -> list[int]:
 
 
 @kept
-def block_values(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, ...]) -> Program:
+def block_values(
+    robot: Robot,
+    primary: tuple[str, ...],
+    secondary: tuple[str, ...],
+    added: tuple[VirtualChain, ...] = (),
+) -> Program:
     """Least singular value of each certifiable block and its error, as a program of ``T_world_base q``.
 
     Args:
         robot: the robot.
         primary: names of the primary couplings, as in ``Mechanism.primary``.
         secondary: names of the secondary couplings.
+        added: further chains, as in ``Mechanism.added``.
     """
-    mechanism = mechanism_of(robot, primary, secondary)
+    mechanism = mechanism_of(robot, primary, secondary, added)
     recorder = Recorder(
         identifier(robot.name, "regular"),
         f"Least singular value of the secondary screws of every block of {robot.name}, velocities over the"
         " robot's size; error: bound of its relative error, the value is certified where it is small.",
     )
-    R, q = pose_input(recorder, "T_world_base").R, recorder.input("q", len(robot.joints))
+    T, q = pose_input(recorder, "T_world_base"), recorder.input("q", len(robot.joints))
     values: list[tuple[Scalar, Scalar]] = []
     for k in _certifiable(mechanism):
         (circuit,), own = mechanism.blocks[k]
         columns = [mechanism.secondary_columns[i] for i in own]
         signs = dict(zip(mechanism.edges, mechanism.circuit_matrix[circuit].tolist(), strict=True))
         names = [mechanism.couplings[c] for c in columns]
-        twists = _at_reference(mechanism, circuit, names, R, q)
+        twists = _at_reference(mechanism, circuit, names, T, q)
         length = characteristic_length(robot)
         values.append(least_singular_value([weighed(twists[name] * signs[name], length) for name in names]))
     recorder.output("least", [value for value, _ in values])
@@ -113,7 +116,7 @@ def block_values(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, .
 
 
 def _at_reference(
-    mechanism: Mechanism, circuit: int, names: Sequence[str], R: Rotation, q: Sequence[Scalar]
+    mechanism: Mechanism, circuit: int, names: Sequence[str], T: Pose, q: Sequence[Scalar]
 ) -> dict[str, Twist]:
     """Screws of some couplings of a circuit at its reference point, in whatever axes they are simplest."""
     tip, robot = tip_of(mechanism, circuit), mechanism.robot
@@ -125,9 +128,9 @@ def _at_reference(
         chain = SerialChain.of(robot, tip.limb.name)
         screws = seen_screws(chain, None, [q[i] for i in path], len(path) - 1)
         return dict(zip(names, screws, strict=True))
-    twists = dict(zip(mechanism.edges, coupling_twists(mechanism, R, q), strict=True))
-    D = link_displacements(robot, q, Displacement(R, ZERO, ZERO))
-    body, held = pose_in_base(robot, D, tip.name), mechanism.held(tip, Pose(R, ZERO))
+    twists = dict(zip(mechanism.edges, coupling_twists(mechanism, T, q), strict=True))
+    D = link_displacements(robot, q, Displacement(T.R, ZERO, ZERO))
+    body, held = pose_in_base(robot, D, tip.name), mechanism.held(tip, Pose(T.R, ZERO))
     here = {name: at(body.p, twist) for name, twist in twists.items()}
     joints = zip(robot.tree, joint_screws(robot, D), strict=True)
     here |= {joint.name: Screw(s.s, s.s0 - body.p, s.pitch).twist for joint, s in joints}

@@ -1,7 +1,8 @@
 """A robot as one closed mechanism: its couplings, links, circuits, and who imposes and who follows.
 
 Couplings stand in the order: ``waist.*``, then per limb its real joints and its tip's virtual chain, then
-joints of no limb. Virtual chains lead from the floor to the waist (floating base) and to every tip.
+joints of no limb, then further chains. Virtual chains lead from the floor to the waist (floating base) and to
+every tip, and further ones from any link to any other.
 """
 
 from __future__ import annotations
@@ -15,29 +16,19 @@ import numpy as np
 from screwkin.algebra.arrays import Array, Booleans, Integers
 from screwkin.algebra.pattern import components
 from screwkin.algebra.se3 import IDENTITY, Pose
+from screwkin.errors import InputError
 from screwkin.mechanism import graph as graphs
 from screwkin.mechanism.chains import SPATIAL, check_chain, held_pose
 from screwkin.mechanism.followers import tip_chain
 from screwkin.mechanism.graph import CouplingGraph
+from screwkin.mechanism.virtual_chain import FLOOR, VirtualChain
 from screwkin.model.display import html_table, listing
-from screwkin.model.robot import Closure, Limb, Robot
+from screwkin.model.robot import Closure, Robot
 
-FLOOR = "floor"
 WAIST = "waist"
 
 
-@dataclass(frozen=True)
-class VirtualChain:
-    """A virtual chain from the floor to a frame: its name, its couplings, and the limb whose tip it moves."""
-
-    name: str
-    couplings: tuple[str, ...]
-    limb: Limb | None
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Full names of its couplings, as in ``right_foot.px``."""
-        return tuple(f"{self.name}.{c}" for c in self.couplings)
+Choice = tuple[tuple[str, ...], tuple[str, ...], tuple[VirtualChain, ...]]
 
 
 @dataclass(frozen=True)
@@ -51,7 +42,17 @@ class Closing:
 
 @dataclass(frozen=True, eq=False)
 class Mechanism:
-    """A closed mechanism with a checked choice of primary (imposed) and secondary (computed) couplings."""
+    """A closed mechanism with a checked choice of primary (imposed) and secondary (computed) couplings.
+
+    Attributes:
+        robot: whose mechanism it is.
+        chains: virtual chains from the floor to the waist and to every tip.
+        graph: links and couplings.
+        primary: names of the imposed couplings, in their order.
+        secondary: names of the computed ones.
+        mobility: couplings less the rank of N.
+        added: further virtual chains, between any two links.
+    """
 
     robot: Robot
     chains: tuple[VirtualChain, ...]
@@ -59,6 +60,7 @@ class Mechanism:
     primary: tuple[str, ...]
     secondary: tuple[str, ...]
     mobility: int
+    added: tuple[VirtualChain, ...] = ()
 
     @cached_property
     def edges(self) -> tuple[str, ...]:
@@ -84,9 +86,9 @@ class Mechanism:
         return G
 
     @property
-    def choice(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """What distinguishes it from other mechanisms of its robot: the primary and secondary couplings."""
-        return self.primary, self.secondary
+    def choice(self) -> Choice:
+        """What tells it from other mechanisms of its robot: couplings by their part, further chains."""
+        return self.primary, self.secondary, self.added
 
     @property
     def links(self) -> tuple[str, ...]:
@@ -111,16 +113,22 @@ class Mechanism:
 
     @cached_property
     def closings(self) -> tuple[Closing, ...]:
-        """What closes every loop: a virtual chain's end at its tip, or a closure of the table."""
+        """What closes every loop: a virtual chain's end at its tip or link, or a closure of the table."""
         limbs = [Closing(c.name, self._column_path(c.limb.link), c.names) for c in self.chains if c.limb]
         loops = [
             Closing(c.name, self._column_path(c.link_a), self._column_path(c.link_b))
             for c in self.robot.closures
         ]
-        return (*limbs, *loops)
+        added = []
+        for chain in self.added:
+            start, end = map(self._column_path, chain.links(self.robot))
+            added.append(Closing(chain.name, end, (*start, *chain.names)))
+        return (*limbs, *loops, *added)
 
     def _column_path(self, link: str) -> tuple[str, ...]:
         """Names of the couplings from the floor to a link: the waist's chain, then real joints."""
+        if link == FLOOR:
+            return ()
         waist = [name for chain in self.chains if chain.limb is None for name in chain.names]
         return (*waist, *(self.robot.tree[i].name for i in self.robot.path_to(link)))
 
@@ -198,8 +206,10 @@ class Mechanism:
 
 def virtual_chains(robot: Robot) -> tuple[VirtualChain, ...]:
     """The waist's chain (floating base) and one for every limb's tip."""
-    chains = [VirtualChain(WAIST, SPATIAL, None)] if robot.base == "floating" else []
-    chains += [VirtualChain(limb.tip, check_chain(tip_chain(robot, limb.name)), limb) for limb in robot.limbs]
+    chains = [VirtualChain(WAIST, SPATIAL, "base")] if robot.base == "floating" else []
+    for limb in robot.limbs:
+        couplings = check_chain(tip_chain(robot, limb.name))
+        chains.append(VirtualChain(limb.tip, couplings, limb.tip, limb=limb))
     return tuple(chains)
 
 
@@ -214,10 +224,15 @@ def welded_links(robot: Robot, closures: Sequence[Closure]) -> dict[str, str]:
     return welded
 
 
-def coupling_graph(robot: Robot, chains: tuple[VirtualChain, ...]) -> CouplingGraph:
+def coupling_graph(
+    robot: Robot, chains: tuple[VirtualChain, ...], added: tuple[VirtualChain, ...] = ()
+) -> CouplingGraph:
     """Vertices and directed edges of the whole mechanism; closures weld the links that they join into one.
 
-    Coupled joints come last, in table order.
+    Further chains come behind all free joints, coupled joints last, in table order.
+
+    Raises:
+        InputError: a further chain leads from a link to itself.
     """
     welded = welded_links(robot, robot.closures)
     edges: list[tuple[str, str, str]] = []
@@ -235,17 +250,22 @@ def coupling_graph(robot: Robot, chains: tuple[VirtualChain, ...]) -> CouplingGr
                 else:
                     following[i] = edge
 
-    def add_chain(chain: VirtualChain, end: str) -> None:
-        stations = [FLOOR, *(f"{chain.name}.{k}" for k in range(1, len(chain.couplings))), end]
+    def add_chain(chain: VirtualChain) -> None:
+        start, end = (welded[link] for link in chain.links(robot))
+        if start == end:
+            raise InputError(
+                f"chain {chain.name} leads from {chain.start} to {chain.end}, which is the same body"
+            )
+        stations = [start, *(f"{chain.name}.{k}" for k in range(1, len(chain.couplings))), end]
         edges.extend(zip(chain.names, stations[:-1], stations[1:], strict=True))
 
     for chain in chains:
-        if chain.limb is None:
-            add_chain(chain, welded[robot.base_link])
-        else:
+        if chain.limb is not None:
             add_joints(robot.path_to(chain.limb.link))
-            add_chain(chain, welded[chain.limb.link])
+        add_chain(chain)
     add_joints(robot.traversal)
+    for chain in added:
+        add_chain(chain)
     edges += [following[i] for i in sorted(following)]
 
     vertices = dict.fromkeys([FLOOR, *(welded[name] for name in robot.link_names)])
@@ -254,14 +274,20 @@ def coupling_graph(robot: Robot, chains: tuple[VirtualChain, ...]) -> CouplingGr
     return CouplingGraph(tuple(v for v in vertices if v in used), tuple(edges))
 
 
-def unchosen(robot: Robot) -> Mechanism:
-    """The mechanism of a robot before any choice: all its couplings are secondary."""
+def unchosen(robot: Robot, added: tuple[VirtualChain, ...] = ()) -> Mechanism:
+    """The mechanism of a robot and further chains before any choice: all its couplings are secondary."""
     chains = virtual_chains(robot)
-    graph = coupling_graph(robot, chains)
+    graph = coupling_graph(robot, chains, added)
     couplings = tuple(name for name, _, _ in graph.edges)[: len(graph.edges) - len(robot.coupled)]
-    return Mechanism(robot, chains, graph, (), couplings, 0)
+    return Mechanism(robot, chains, graph, (), couplings, 0, added)
 
 
-def mechanism_of(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, ...]) -> Mechanism:
+def mechanism_of(
+    robot: Robot,
+    primary: tuple[str, ...],
+    secondary: tuple[str, ...],
+    added: tuple[VirtualChain, ...] = (),
+) -> Mechanism:
     """The mechanism of a robot with a choice that has been checked."""
-    return replace(unchosen(robot), primary=primary, secondary=secondary, mobility=len(primary))
+    bare = unchosen(robot, added)
+    return replace(bare, primary=primary, secondary=secondary, mobility=len(primary))

@@ -14,7 +14,7 @@ import numpy as np
 from screwkin.algebra.arrays import Integers
 from screwkin.algebra.scalar import Scalar, is_jax, structural
 from screwkin.algebra.screws import at
-from screwkin.algebra.se3 import NO_TWIST, ZERO, Pose, Rotation, Twist, Vector, as_array, bracket
+from screwkin.algebra.se3 import NO_TWIST, ZERO, Pose, Twist, Vector, as_array, bracket
 from screwkin.kinematics.formula import formula
 from screwkin.kinematics.kinds import Columns, Joints
 from screwkin.kinematics.positions import joint_twists, link_displacements, pose_in_base
@@ -23,25 +23,39 @@ from screwkin.mechanism.mechanism import Mechanism
 
 
 def coupling_twists(
-    mechanism: Mechanism, R: Rotation, q: Sequence[Scalar], point: Vector = ZERO
+    mechanism: Mechanism,
+    T: Pose,
+    q: Sequence[Scalar],
+    point: Vector = ZERO,
+    coordinates: Sequence[Scalar] | None = None,
 ) -> list[Twist]:
     """Normalised screw of every edge of the mechanism, world axes: the couplings', then the coupled joints'.
 
     Args:
         mechanism: the closed mechanism.
-        R: orientation of the base.
+        T: pose of the base. Where it stands enters into chains only that turn about a place of the floor: of
+            others, virtual translations have no place, virtual rotations pass through their body.
         q: joint positions in table order.
-        point: where the screws are taken, from the base origin, world axes [m]. Where the robot stands does
-            not enter: virtual translations have no place, virtual rotations pass through their body.
+        point: where the screws are taken, from the base origin, world axes [m].
+        coordinates: of all couplings, where further chains do not reach their ends [m, rad].
     """
     robot = mechanism.robot
     D = link_displacements(robot, q)
-    turned = Pose(R, ZERO)
+    turned = Pose(T.R, ZERO)
     twists = {joint.name: t for joint, t in zip(robot.tree, joint_twists(robot, D, turned), strict=True)}
     for chain in mechanism.chains:
         body = turned if chain.limb is None else turned @ pose_in_base(robot, D, chain.limb.tip)
         R_chain = body.R @ mechanism.held(chain, turned).R.T
         twists |= zip(chain.names, chain_twists(chain.couplings, R_chain, body.p), strict=True)
+    carried = dict(zip(robot.link_names, D, strict=True))
+    for chain in mechanism.added:
+        start, end = chain.ends(robot, T, carried)
+        if coordinates is None:
+            values = chain.coordinates(start, end)
+        else:
+            values = [coordinates[mechanism.position[name]] for name in chain.names]
+            end = chain.reached(start, values)
+        twists |= zip(chain.names, chain.twists(start, end, values), strict=True)
     return [at(point, twists[name]) for name in mechanism.edges]
 
 
@@ -56,7 +70,7 @@ def coupling_screws(mechanism: Mechanism, T_world_base: Pose, q: Joints) -> Colu
     Returns:
         S (..., 6, edges), columns [omega; v at the base origin] in the order of ``mechanism.edges``.
     """
-    return coupling_twists(mechanism, T_world_base.R, q)
+    return coupling_twists(mechanism, T_world_base, q)
 
 
 def network_blocks(mechanism: Mechanism, twists: Sequence[Twist]) -> list[list[Twist]]:

@@ -51,7 +51,7 @@ def network_matrix(
     Source: paper A, eq. 8-9.
     """
     at = ZERO if point is None else point - T_world_base.p
-    blocks = network_blocks(mechanism, coupling_twists(mechanism, T_world_base.R, q, at))
+    blocks = network_blocks(mechanism, coupling_twists(mechanism, T_world_base, q, at))
     columns = range(len(mechanism.couplings))
     return [[x for circuit in blocks for x in leaves(circuit[c])] for c in columns]
 
@@ -67,7 +67,8 @@ def virtual_motion(
         state: the present state.
         base_twist: [omega; v of the base origin], world axes; without effect on a fixed base.
         tip_twists: for every tip with primary couplings [omega; v of the tip's origin], or v alone (..., 3)
-            where only translations are primary.
+            where only translations are primary; likewise for every further chain, of its end relative to its
+            start, at the end's origin.
 
     Returns:
         (..., primary) in ``mechanism.primary`` order [rad/s, m/s].
@@ -93,7 +94,7 @@ def virtual_motion(
     for chain in chains:
         wanted = [name for name in chain.names if name in mechanism.primary]
         if chain.name not in given:
-            lacks = "base_twist is None" if chain.limb is None else f"tip_twists lacks {chain.name}"
+            lacks = "base_twist is None" if chain.name == WAIST else f"tip_twists lacks {chain.name}"
             raise InputError(f"{lacks}, but {', '.join(wanted)} are primary")
         turning = any(name.split(".")[1][0] == "r" for name in wanted)
         if given[chain.name].omega is ZERO and turning:

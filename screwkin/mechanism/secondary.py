@@ -23,9 +23,10 @@ from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.chains import chain_twists
 from screwkin.mechanism.limb_motion import LimbMotion
 from screwkin.mechanism.limb_rates import Split, pose_rates
-from screwkin.mechanism.mechanism import Mechanism, VirtualChain, mechanism_of
+from screwkin.mechanism.mechanism import Mechanism, mechanism_of
 from screwkin.mechanism.network import coupling_screws, coupling_twists
 from screwkin.mechanism.scaling import characteristic_length, reference_couplings
+from screwkin.mechanism.virtual_chain import VirtualChain
 from screwkin.model.robot import Robot
 
 
@@ -40,13 +41,19 @@ def formula_blocks(mechanism: Mechanism) -> list[int]:
 
 
 @kept
-def secondary_door(robot: Robot, primary: tuple[str, ...], secondary: tuple[str, ...]) -> Door:
+def secondary_door(
+    robot: Robot,
+    primary: tuple[str, ...],
+    secondary: tuple[str, ...],
+    added: tuple[VirtualChain, ...] = (),
+) -> Door:
     """Rates of the secondary couplings of all ``formula_blocks``, and a bound of their singular values.
 
     Args:
         robot: the robot.
         primary: names of the primary couplings, as in ``Mechanism.primary``.
         secondary: names of the secondary couplings.
+        added: further chains, as in ``Mechanism.added``.
 
     Returns:
         Calls of ``T_world_base q primary``; ``secondary``: all rates, 0 of couplings in other blocks;
@@ -54,15 +61,16 @@ def secondary_door(robot: Robot, primary: tuple[str, ...], secondary: tuple[str,
 
     Source: paper A, eq. 10-11.
     """
-    mechanism = mechanism_of(robot, primary, secondary)
+    mechanism = mechanism_of(robot, primary, secondary, added)
     recorder = Recorder(
         identifier(robot.name, "secondary"),
         f"Rates of the secondary couplings of {robot.name} from those of the primary ones; least: a lower"
         " bound of the singular values of each block's screws, velocities over the robot's size.",
     )
-    R, q = pose_input(recorder, "T_world_base").R, recorder.input("q", len(robot.joints))
+    T, q = pose_input(recorder, "T_world_base"), recorder.input("q", len(robot.joints))
+    R = T.R
     imposed = dict(zip(primary, recorder.input("primary", len(primary)), strict=True))
-    twists = _in_base_axes(mechanism, R, q)
+    twists = _in_base_axes(mechanism, T, q)
     D = link_displacements(robot, q)
     bodies = _by_bodies(mechanism, R, D)
     rates: list[Scalar] = [0.0] * len(secondary)
@@ -71,7 +79,7 @@ def secondary_door(robot: Robot, primary: tuple[str, ...], secondary: tuple[str,
         (circuit,), own = mechanism.blocks[k]
         signs = dict(zip(mechanism.edges, mechanism.circuit_matrix[circuit].tolist(), strict=True))
         wanted = NO_TWIST
-        for name in robot.joint_names:
+        for name in (*robot.joint_names, *(name for chain in added for name in chain.names)):
             if name in imposed:
                 wanted = wanted - twists[name] * imposed[name] * signs[name]
         for place, screws in bodies:
@@ -98,10 +106,10 @@ def secondary_arguments(robot: Robot, primary: Sequence[str]) -> list[Argument]:
     return [*(a for own in state for a in own), Argument("primary", "primary_rates", (len(primary),))]
 
 
-def _in_base_axes(mechanism: Mechanism, R: Rotation, q: Sequence[Scalar]) -> dict[str, Twist]:
+def _in_base_axes(mechanism: Mechanism, T: Pose, q: Sequence[Scalar]) -> dict[str, Twist]:
     """Every coupling's screw at the base origin, base axes, where joints have most zeros."""
-    real, back = set(mechanism.robot.joint_names), R.T
-    level, turned = (coupling_twists(mechanism, axes, q) for axes in (UNTURNED, R))
+    real, back = set(mechanism.robot.joint_names), T.R.T
+    level, turned = (coupling_twists(mechanism, pose, q) for pose in (IDENTITY, T))
     return {
         name: level[k] if name in real else turn(back, turned[k])
         for k, name in enumerate(mechanism.couplings)

@@ -9,10 +9,13 @@ from collections.abc import Mapping, Sequence
 
 from screwkin.algebra.linear import cramer
 from screwkin.algebra.scalar import Scalar
+from screwkin.algebra.screws import at
 from screwkin.algebra.se3 import ZERO, Pose, Rotation, Twist, Vector, cross
 from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.mechanism.chains import chain_twists, rotations
-from screwkin.mechanism.mechanism import Mechanism, VirtualChain
+from screwkin.mechanism.mechanism import Mechanism
+from screwkin.mechanism.pairs import pair_rates
+from screwkin.mechanism.virtual_chain import VirtualChain
 
 
 def _axes(chain: Sequence[str], R: Rotation) -> list[Vector]:
@@ -44,7 +47,8 @@ def chain_accelerations(
 
 def imposing_chains(mechanism: Mechanism) -> list[VirtualChain]:
     """The virtual chains with a primary coupling: those whose bodies' motion must be given."""
-    return [chain for chain in mechanism.chains if any(name in mechanism.primary for name in chain.names)]
+    every = (*mechanism.chains, *mechanism.added)
+    return [chain for chain in every if any(name in mechanism.primary for name in chain.names)]
 
 
 def primary_motion(
@@ -56,17 +60,26 @@ def primary_motion(
 ) -> dict[str, Scalar]:
     """Rates of the imposing chains' couplings, or with ``accelerations`` their second derivatives.
 
+    Of further chains rates alone.
+
     Args:
         mechanism: its primary couplings belong to virtual chains.
         T: pose of the base in the world.
         q: joint positions in table order.
-        twists: by chain name, [omega; v] of its body at the body's own origin, world axes. Where only
-            translations are primary, omega does not matter.
+        twists: by chain name, [omega; v] of its body at the body's own origin, world axes; of a further
+            chain, of its end relative to its start. Where only translations are primary, omega does not matter.
         accelerations: by chain name, the twists' time derivatives.
     """
     D = link_displacements(mechanism.robot, q)
     motion: dict[str, Scalar] = {}
+    carried = dict(zip(mechanism.robot.link_names, D, strict=True))
     for chain in imposing_chains(mechanism):
+        if chain in mechanism.added:
+            start, end = chain.ends(mechanism.robot, T, carried)
+            screws = chain.twists(start, end, chain.coordinates(start, end))
+            there = [at(end.p, screw) for screw in screws]
+            motion |= zip(chain.names, pair_rates(chain.couplings, there, twists[chain.name]), strict=True)
+            continue
         body = T if chain.limb is None else T @ pose_in_base(mechanism.robot, D, chain.name)
         R = body.R @ mechanism.held(chain, T).R.T
         twist = twists[chain.name]

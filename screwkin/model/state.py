@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.pytrees import pytree
+from screwkin.algebra.se3 import UNTURNED, Pose, Vector
 from screwkin.errors import expect
 from screwkin.model.robot import Robot
 
@@ -74,3 +75,10 @@ def reference_posture(robot: Robot) -> tuple[float, ...]:
     """q at which a robot is examined: posture ``home``, else the first posture, else all zero."""
     named = {posture.name: posture.q for posture in robot.postures}
     return named.get("home") or (robot.postures[0].q if robot.postures else (0.0,) * len(robot.joints))
+
+
+def reference_base(robot: Robot) -> Pose:
+    """Pose of the base there: upright over the world origin, at that posture's height."""
+    named = {posture.name: posture.base_height for posture in reversed(robot.postures)}
+    height = named.get("home", robot.postures[0].base_height if robot.postures else 0)
+    return Pose(UNTURNED, Vector(0, 0, height))

@@ -18,7 +18,7 @@ import sympy
 
 import screwkin as sk
 from screwkin.algebra.screws import INFINITE, Screw, displacement
-from screwkin.algebra.se3 import UNTURNED, Vector, leaves, rotate
+from screwkin.algebra.se3 import IDENTITY, Vector, leaves, rotate
 from screwkin.kinematics.mass import mass_center, mass_center_velocities
 from screwkin.kinematics.positions import joint_twists, link_displacements, pose_in_base
 from screwkin.mechanism.network import coupling_twists, network_blocks
@@ -85,7 +85,7 @@ def com_of_leg(q: Sequence[Any]) -> list[Any]:
 
 
 def network_block_of_leg(q: Sequence[Any]) -> list[Any]:
-    (row,) = network_blocks(leg_mechanism(), coupling_twists(leg_mechanism(), UNTURNED, q))
+    (row,) = network_blocks(leg_mechanism(), coupling_twists(leg_mechanism(), IDENTITY, q))
     return scalars(list(row))
 
 

@@ -12,7 +12,7 @@ from screwkin.mechanism.scaling import referenced
 
 def network_of(mechanism, state):
     """N (B, rows, couplings) of a flat batch."""
-    twists = coupling_twists(mechanism, pose_from_array(state.T_world_base).R, unstack(state.q))
+    twists = coupling_twists(mechanism, pose_from_array(state.T_world_base), unstack(state.q))
     return network_of_twists(mechanism, twists, np.shape(state.q)[:-1])
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given, settings
 
 import screwkin as sk
-from screwkin.algebra.se3 import UNTURNED, as_array, pose_from_array, unstack
+from screwkin.algebra.se3 import IDENTITY, as_array, pose_from_array, unstack
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.kinematics.status import Status
 from screwkin.mechanism.closure import close_loops, closure_errors
@@ -51,7 +51,7 @@ def test_differences_of_closed_positions_are_the_rates_and_accelerations(seed):
     second = (-x[0] + 16 * x[1] - 30 * x[2] + 16 * x[3] - x[4]) / (12 * STEP**2)
 
     T, q = solution.state.T_world_base[2], solution.state.q[2]
-    N = network_of_twists(mechanism, coupling_twists(mechanism, pose_from_array(T).R, q))
+    N = network_of_twists(mechanism, coupling_twists(mechanism, pose_from_array(T), q))
     assert np.abs(N @ rates).max() < 1e-6
     found = solve_rates(mechanism, T, q, speed)
     assert not found.singular.any()
@@ -76,7 +76,7 @@ def test_the_rates_of_the_screws_are_their_differences(seed):
     N = sk.network_matrix(mechanism, home)
     kernel = np.linalg.svd(N)[2][np.linalg.matrix_rank(N) :]
     rates = rng.uniform(-1, 1, len(kernel)) @ kernel
-    twists = coupling_twists(mechanism, UNTURNED, list(home.q))
+    twists = coupling_twists(mechanism, IDENTITY, list(home.q))
     derivative = as_array(twist_rates(mechanism, twists, list(rates)))
 
     def screws(t):
@@ -86,7 +86,7 @@ def test_the_rates_of_the_screws_are_their_differences(seed):
         x = x0 + t * rates
         base = base_pose(mechanism, list(x), pose_from_array(np.eye(4)))
         q = [x[mechanism.position[name]] for name in robot.joint_names]
-        return as_array(coupling_twists(mechanism, base.R, q, ZERO - base.p))
+        return as_array(coupling_twists(mechanism, base, q, ZERO - base.p))
 
     h = 1e-5
     found = (screws(h) - screws(-h)) / (2 * h)
@@ -103,7 +103,7 @@ def test_the_closure_error_of_an_open_loop_shrinks_to_first_order_by_the_closing
     dx = 1e-6 * rng.uniform(-1, 1, len(x))
     fixed = pose_from_array(np.eye(4))
     q = [x[mechanism.position[name]] for name in mechanism.robot.joint_names]
-    twists = coupling_twists(mechanism, UNTURNED, q)
+    twists = coupling_twists(mechanism, IDENTITY, q)
     C = network_of_twists(mechanism, twists, circuits=mechanism.closing_matrix)
     missing = as_array(closure_errors(mechanism, unstack(x + dx), fixed)).reshape(-1)
     np.testing.assert_allclose(missing, -C @ dx, atol=2e-11)
