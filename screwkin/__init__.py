@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from screwkin.mechanism.singularity import singularity_report
     from screwkin.mechanism.statics import static_forces
     from screwkin.mechanism.tip_motion import joint_rates
+    from screwkin.mechanism.virtual_chain import VirtualChain
     from screwkin.model.library import robot_names
     from screwkin.model.robot import Robot
     from screwkin.model.state import State, home
@@ -62,6 +63,7 @@ _HOMES = {
     "mechanism.singularity": "singularity_report",
     "mechanism.statics": "static_forces",
     "mechanism.tip_motion": "joint_rates",
+    "mechanism.virtual_chain": "VirtualChain",
     "model.library": "robot_names",
     "model.robot": "Robot",
     "model.state": "State home",
@@ -80,6 +82,7 @@ __all__ = [
     "State",
     "Trajectory",
     "Validation",
+    "VirtualChain",
     "action_matrix",
     "bind",
     "center_of_mass",

@@ -254,7 +254,7 @@ def coupling_graph(
         start, end = (welded[link] for link in chain.links(robot))
         if start == end:
             raise InputError(
-                f"chain {chain.name} leads from {chain.start} to {chain.end}, which is the same body"
+                f"chain {chain.name}: {chain.start} and {chain.end} are the same body; name frames of two"
             )
         stations = [start, *(f"{chain.name}.{k}" for k in range(1, len(chain.couplings))), end]
         edges.extend(zip(chain.names, stations[:-1], stations[1:], strict=True))

@@ -111,7 +111,7 @@ class VirtualChain:
         return reached
 
     def twists(self, start: Pose, end: Pose, values: Sequence[Scalar]) -> list[Twist]:
-        """Normalised screws of its couplings where its ends are, in the axes and from the point of the poses."""
+        """Normalised screws of its couplings where its ends are, in the axes and from the point of those."""
         return pair_screws(self.couplings, values, start, end.p)
 
 

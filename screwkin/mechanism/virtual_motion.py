@@ -67,7 +67,8 @@ def primary_motion(
         T: pose of the base in the world.
         q: joint positions in table order.
         twists: by chain name, [omega; v] of its body at the body's own origin, world axes; of a further
-            chain, of its end relative to its start. Where only translations are primary, omega does not matter.
+            chain, of its end relative to its start. Where only translations are primary, omega does not
+            matter.
         accelerations: by chain name, the twists' time derivatives.
     """
     D = link_displacements(mechanism.robot, q)

@@ -98,7 +98,7 @@ def test_the_same_lines_serve_symbols_and_jax():
     pose = pair_pose(("rz", "px", "rz"), [a, r, b])
     assert sympy.simplify(pose.p.x - r * sympy.cos(a)) == 0
     assert sympy.simplify(pose.R.x.x - sympy.cos(a + b)) == 0
-    chain, x = NAMED["spherical"], np.array([0.3, 0.4, 0.5, 0.6, 0.7, 0.8])
+    chain, x = NAMED["RPR"], np.array([0.3, 0.4, 0.5])
 
     with jax.enable_x64(True):
 
@@ -107,7 +107,7 @@ def test_the_same_lines_serve_symbols_and_jax():
 
         J = jax.jit(jax.jacfwd(there_and_back))(jax.numpy.asarray(x))
         assert pose_from_array(jax.numpy.eye(4)).p.x.dtype == J.dtype
-    np.testing.assert_allclose(J, np.eye(6), atol=1e-12)
+    np.testing.assert_allclose(J, np.eye(3), atol=1e-12)
 
 
 def test_couplings_that_stand_again_are_numbered():
