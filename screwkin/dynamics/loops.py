@@ -16,8 +16,8 @@ from screwkin.algebra.linear import Orthogonal, definite, product
 from screwkin.algebra.scalar import Scalar, is_jax, plus, times
 from screwkin.algebra.screws import at
 from screwkin.algebra.se3 import (
+    IDENTITY,
     NO_TWIST,
-    UNTURNED,
     ZERO,
     Twist,
     Vector,
@@ -80,7 +80,7 @@ class Admitted:
     def at(cls, robot: Robot, q: Sequence[Scalar]) -> Admitted:
         """The admitted motions at joint positions q."""
         mechanism = loops_of(robot)
-        twists = coupling_twists(mechanism, UNTURNED, q)
+        twists = coupling_twists(mechanism, IDENTITY, q)
         rows = network_blocks(mechanism, twists)
         systems = [_Block.of(mechanism, twists, rows, k) for k in range(len(mechanism.blocks))]
         driving = [robot.joint_names.index(name) for name in driving_joints(robot)]
