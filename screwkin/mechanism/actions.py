@@ -32,8 +32,9 @@ from screwkin.kinematics.formula import formula
 from screwkin.kinematics.kinds import Columns, Joints
 from screwkin.kinematics.positions import link_displacements
 from screwkin.mechanism.graph import CouplingGraph, cut_set_matrix
-from screwkin.mechanism.mechanism import FLOOR, Mechanism, welded_links
+from screwkin.mechanism.mechanism import Mechanism, welded_links
 from screwkin.mechanism.scaling import centre
+from screwkin.mechanism.virtual_chain import FLOOR
 from screwkin.model.robot import Closure, Joint, Robot
 from screwkin.model.state import State
 
