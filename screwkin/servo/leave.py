@@ -89,7 +89,10 @@ def _hold(gate: Gate, bus: Bus, as_is: bool) -> tuple[str, ...]:
         left = [
             k
             for k in left
-            if k not in goals or read(k, "goal_position") != goals[k] or read(k, "torque_enable") != 1
+            if k not in goals
+            or read(k, "goal_position") != goals[k]
+            or read(k, "torque_enable") != 1
+            or not read(k, "torque_limit")  # 0 once a servo of protocol 1.0 has shut itself down
         ]
         if not left:
             break

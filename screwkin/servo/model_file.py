@@ -249,6 +249,10 @@ _BUS: Mapping[str, _Kind] = {
     ),
     "fast_sync_read": (lambda value: _integer(value, 1, 255), "the first firmware that has it"),
     "reverse_bit": (lambda value: _integer(value, 0, 7), "the bit of drive_mode that reverses"),
+    "shutdown_clears": (
+        lambda value: value in ("torque_limit", "torque_enable", "nothing"),
+        '"torque_limit", "torque_enable" or "nothing": what a shutdown sets to 0',
+    ),
     "homing_sign": (lambda value: value in (1, -1), "1 or -1"),
 }
 _ROW: Mapping[str, _Kind] = {

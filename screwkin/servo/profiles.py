@@ -56,6 +56,11 @@ class Register:
         """The address after its last byte."""
         return self.address + self.width
 
+    @cached_property
+    def sign_bit(self) -> int:
+        """The bit that makes a value negative, 0 if none does."""
+        return 1 << int(self.sign[4:]) if self.sign.startswith("bit-") else 0
+
 
 @dataclass(frozen=True)
 class Indirect:
@@ -80,7 +85,8 @@ class Profile:
     table of indirect addresses; ``fast_sync_read`` the first firmware with that instruction;
     ``multi_turn`` which value of both angle limits lets it turn over several turns; ``alarms`` the bits of
     its shutdown and hardware error registers; ``reverse_bit`` that of ``drive_mode`` by which it turns the
-    other way; a position shown is the true one plus ``homing_sign`` times ``homing_offset``; ``source`` is
+    other way; a position shown is the true one plus ``homing_sign`` times ``homing_offset``;
+    ``shutdown_clears`` is the register that a shutdown sets to 0; ``source`` is
     where its table stands, ``sheet`` where its figures do.
     """
 
@@ -109,6 +115,7 @@ class Profile:
     alarms: Mapping[str, int] = field(default_factory=lambda: MappingProxyType(_ALARM_BITS))
     reverse_bit: int = 0
     homing_sign: int = 1
+    shutdown_clears: Literal["torque_limit", "torque_enable", "nothing"] = "torque_limit"
     stall_current: float = 0.0
     baud_from_250: tuple[int, ...] = ()
     source: str = ""
@@ -237,11 +244,13 @@ def decode(register: Register, raw: int) -> int:
 
     On servos with a bit for the direction, it stands for clockwise: towards smaller ticks, negative here.
     """
+    if register.sign == "none":
+        return raw
     if register.sign == "twos" and raw >= 1 << (8 * register.width - 1):
         return raw - (1 << (8 * register.width))
     if register.sign == "from-2048":
         return raw - 2048
-    if bit := _sign_bit(register):
+    if bit := register.sign_bit:
         return -(raw & ~bit) if raw & bit else raw
     return raw
 
@@ -258,14 +267,9 @@ def encode(register: Register, value: int) -> int:
         )
     if register.sign == "from-2048":
         return value + 2048
-    if bit := _sign_bit(register):
+    if bit := register.sign_bit:
         return bit | -value if value < 0 else value
     return value % (1 << (8 * register.width))
-
-
-def _sign_bit(register: Register) -> int:
-    """The bit that makes a value negative, 0 if none does."""
-    return 1 << int(register.sign[4:]) if register.sign.startswith("bit-") else 0
 
 
 def physical(profile: Profile, name: str, raw: int) -> float:

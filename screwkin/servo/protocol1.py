@@ -48,7 +48,8 @@ FACTS = ProtocolFacts(
     ping_names_model=False,
     levels=(0, 1, 2),
     partial_reset=False,
-    locked_while_stiff=False,
+    locked_while_stiff=True,
+    unlocked_to_last=False,
 )
 
 _HEADER = b"\xff\xff"

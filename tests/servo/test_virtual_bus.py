@@ -94,17 +94,19 @@ def test_the_output_yields_to_a_load_by_the_stiffness():
     assert line.read(1, "present_load") == 0x400 + round(0.4 * 1023)
 
 
-def test_a_lasting_overload_takes_the_torque_away_until_it_is_switched_on_again():
+def test_a_lasting_overload_takes_the_torque_away_until_its_limit_is_set_again():
     line = Line(faults=[InjectedFault("overload", at=0.1, until=2.0, id=1)])
     line.write(1, "goal_position", 700)
     line.write(2, "goal_position", 700)
     line.clock.sleep(1.0)
     assert line.send(1, 1)[0].instruction == 0x20
-    assert (line.read(1, "torque_enable"), line.read(2, "torque_enable")) == (0, 1)
+    assert (line.read(1, "torque_limit"), line.read(2, "torque_limit")) == (0, 1023)
     line.write(1, "goal_position", 600)
-    assert line.read(1, "torque_enable") == 0
-    line.clock.sleep(1.5)
     line.write(1, "torque_enable", 1)
+    assert line.read(1, "torque_limit") == 0
+    assert not line.servos[0].torque_on
+    line.clock.sleep(1.5)
+    line.write(1, "torque_limit", 1023)
     assert line.send(1, 1)[0].instruction == 0
     line.clock.sleep(0.5)
     assert line.read(1, "present_position") == 600

@@ -1,7 +1,7 @@
 """The body of a virtual servo: its motion, deflection under load, temperature and alarms.
 
-The motor follows its goal to first order with a limited speed; the load deflects the output on a spring. All
-of it is in closed form, so that it does not matter how often one looks.
+The motor follows its goal, or a rate, to first order with a limited speed; the load deflects the output on a
+spring. All of it is in closed form, so that it does not matter how often one looks.
 """
 
 from __future__ import annotations
@@ -16,13 +16,33 @@ _STALL_RISE = 60.0  # K above ambient that full torque would lead to
 _WARMING = 60.0  # s
 
 
+@dataclass(frozen=True)
+class ToAngle:
+    """Drive to an angle from the centre [rad], no faster than ``speed`` [rad/s]."""
+
+    angle: float
+    speed: float
+
+
+@dataclass(frozen=True)
+class AtRate:
+    """Drive at a rate [rad/s] without end."""
+
+    rate: float
+
+
+Drive = ToAngle | AtRate | None
+"""What the firmware wants of the motor; None: limp."""
+
+
 @dataclass
 class Body:
     """Angles from the servo's centre [rad], torques [N m], times [s], temperatures [degrees Celsius].
 
     ``stiffness`` [N m/rad] is that of the joint; ``load`` is what the world turns the output with, positive
     towards greater ticks. ``lag`` is the time constant of the motion. A load beyond the torque limit is an
-    overload once it has lasted for ``patience``.
+    overload once it has lasted for ``patience``. ``sag`` [V] is what the current of all servos takes of the
+    supply.
     """
 
     stall_torque: float
@@ -37,6 +57,12 @@ class Body:
     rate: float = 0.0
     time: float = 0.0
     overloaded: float = 0.0
+    sag: float = 0.0
+
+    @property
+    def supply(self) -> float:
+        """The voltage that arrives [V]."""
+        return self.voltage - self.sag
 
     @property
     def output(self) -> float:
@@ -48,20 +74,29 @@ class Body:
         """The torque that holds against the load, as a share of the stall torque."""
         return -self.load / self.stall_torque
 
-    def advance(self, time: float, goal: float | None, speed: float, torque: float) -> None:
-        """Go on to a time, with a goal (None: limp), a speed limit [rad/s] and a torque limit [share]."""
+    def advance(self, time: float, drive: Drive, torque: float) -> None:
+        """Go on to a time with a drive and a torque limit [share of the stall torque]."""
         dt = time - self.time
         if dt <= 0:
             return
         self.time = time
-        if goal is None:
+        if drive is None:
             self.rate, heat, strained = 0.0, 0.0, False
         else:
-            self.angle, self.rate = follow(self.angle, goal, dt, speed, self.lag)
+            if isinstance(drive, ToAngle):
+                self.angle, self.rate = follow(self.angle, drive.angle, dt, drive.speed, self.lag)
+            else:
+                self.angle, self.rate = spin(self.angle, self.rate, drive.rate, dt, self.lag)
             heat, strained = self.effort**2, abs(self.effort) > torque
         warm = self.ambient + _STALL_RISE * heat
         self.temperature = warm + (self.temperature - warm) * math.exp(-dt / _WARMING)
         self.overloaded = self.overloaded + dt if strained else 0.0
+
+
+def spin(angle: float, rate: float, wanted: float, dt: float, lag: float) -> tuple[float, float]:
+    """Angle and rate after ``dt`` of d(rate)/dt = (wanted - rate)/lag."""
+    left = (rate - wanted) * math.exp(-dt / lag)
+    return angle + wanted * dt + lag * (rate - wanted - left), wanted + left
 
 
 def follow(angle: float, goal: float, dt: float, speed: float, lag: float) -> tuple[float, float]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import errno
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from heapq import heappop, heappush
 from typing import Protocol
 
@@ -63,6 +63,7 @@ class VirtualBus:
         seed: of what is random in faults.
         witness: called for every command that reaches a servo.
         adapter: time that the port's adapter holds answers back [s].
+        supply: resistance of the servos' common supply [ohm]; the current of all lowers the voltage of each.
     """
 
     def __init__(
@@ -74,9 +75,10 @@ class VirtualBus:
         seed: int = 0,
         witness: Witness | None = None,
         adapter: float = 0.0,
+        supply: float = 0.0,
     ) -> None:
         self.servos, self.clock, self.baudrate = tuple(servos), clock, baud
-        self.adapter = adapter
+        self.adapter, self.supply = adapter, supply
         self.packets = self.answers = 0
         self.pulled = False
         self._codec: Codec = codec(servos[0].profile.protocol if servos else 1.0)
@@ -111,6 +113,7 @@ class VirtualBus:
     def advance(self) -> None:
         """Let the servos come to the present time."""
         self._live_through(self.clock.now())
+        self._load_supply(self.clock.now())
         for servo in self.servos:
             servo.advance(self.clock.now())
 
@@ -172,10 +175,17 @@ class VirtualBus:
         """Let the servos concerned carry out a packet; returns when the line is free again."""
         requests: list[tuple[VirtualServo, Request]] = []
         tolerated = _SAME_RATE * self.baudrate
+        self._load_supply(time)
         for servo in self.servos:
-            if packet.id not in (servo.id, BROADCAST) or abs(servo.baud - self.baudrate) > tolerated:
+            if abs(servo.baud - self.baudrate) > tolerated:
+                continue
+            servo.hear(time)
+            if packet.id not in (servo.id, servo.second_id, BROADCAST):
                 continue
             command = self._codec.command_for(packet, servo.id)
+            if command is None and servo.second_id != BROADCAST:
+                second = self._codec.command_for(packet, servo.second_id)
+                command = replace(second, answers=False, after=()) if second else None
             if command is not None:
                 requests.append((servo, command))
         requests.sort(key=lambda pair: len(pair[1].after))
@@ -190,6 +200,15 @@ class VirtualBus:
             if spoken:
                 said.add(id)
         return time
+
+    def _load_supply(self, time: float) -> None:
+        """Let the current of all servos lower the voltage of each."""
+        if self.supply:
+            for servo in self.servos:
+                servo.advance(time)
+            sag = self.supply * sum(servo.current for servo in self.servos)
+            for servo in self.servos:
+                servo.body.sag = sag
 
     def _answer(self, servo: VirtualServo, command: Request, time: float) -> tuple[float, bytes] | None:
         """What a servo answers: its return delay, and the bytes."""
