@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from screwkin.analysis.validate import Validation, validate
+    from screwkin.dynamics.contact import ContactPatch
+    from screwkin.dynamics.contact_forces import contact_forces
     from screwkin.dynamics.forward import forward_dynamics
     from screwkin.dynamics.quantities import ground_wrench, inverse_dynamics, mass_matrix, momentum
     from screwkin.errors import ScrewkinError
@@ -43,6 +45,8 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "analysis.validate": "Validation validate",
+    "dynamics.contact": "ContactPatch",
+    "dynamics.contact_forces": "contact_forces",
     "dynamics.forward": "forward_dynamics",
     "dynamics.quantities": "ground_wrench inverse_dynamics mass_matrix momentum",
     "errors": "ScrewkinError",
@@ -75,6 +79,7 @@ _HOME_OF = {name: f"screwkin.{module}" for module, names in _HOMES.items() for n
 __version__ = "0.1.0"
 __all__ = [
     "Balance",
+    "ContactPatch",
     "Gait",
     "Mechanism",
     "Robot",
@@ -89,6 +94,7 @@ __all__ = [
     "close_loops",
     "closed_mechanism",
     "com_jacobian",
+    "contact_forces",
     "fitting_gait",
     "forward_dynamics",
     "frame_pose",

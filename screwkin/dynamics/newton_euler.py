@@ -7,7 +7,7 @@ that instant), so numbers stay small wherever the robot stands. Base motion is g
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from screwkin.algebra.scalar import Scalar, plus, times
@@ -123,8 +123,12 @@ def wrench_and_efforts(
     gravity: Scalar,
 ) -> tuple[Wrench, list[Scalar]]:
     """Wrench on the base (about its origin) and joint torques (recursive Newton-Euler)."""
-    robot = bodies.robot
-    W = link_wrenches(bodies, qd, qdd, base, base_rate, gravity)
+    return carried(bodies, link_wrenches(bodies, qd, qdd, base, base_rate, gravity))
+
+
+def carried(bodies: Bodies, wrenches: Mapping[str, Wrench]) -> tuple[Wrench, list[Scalar]]:
+    """Wrench on the base and joint efforts that supply every link's wrench, all about the base origin."""
+    robot, W = bodies.robot, dict(wrenches)
     for i in reversed(robot.traversal):
         joint = robot.tree[i]
         W[joint.parent] = W[joint.parent] + W[joint.child]

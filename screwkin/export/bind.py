@@ -25,7 +25,7 @@ from screwkin.kinematics.kinds import STATE
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 
-Choice = str | tuple[str, ...]
+Choice = str | tuple[Any, ...]
 """A quantity by its name; with choices, as ``("frame_pose", "right_foot")``."""
 
 
@@ -105,7 +105,13 @@ def _named(robot: Robot, choice: Choice, optional: Sequence[str]) -> Part:
     definition = quantity.definition
     subject = subject_of(robot, quantity)
     given = definition.inputs(subject, optional)
-    return subject, definition, given, definition.chosen(words), identifier(name, *words) if words else name
+    return (
+        subject,
+        definition,
+        given,
+        definition.chosen(words),
+        identifier(name, *map(str, words)) if words else name,
+    )
 
 
 class Bound:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 
 from screwkin.analysis.workspace import map_program
 from screwkin.compiler.program import Program
+from screwkin.dynamics.contact import contact_distribution
 from screwkin.dynamics.forward import forward_dynamics
 from screwkin.dynamics.quantities import balance, ground_wrench, inverse_dynamics, mass_matrix, momentum
 from screwkin.errors import UnknownNameError
@@ -46,6 +47,7 @@ QUANTITIES: Mapping[str, Quantity] = {
         mass_matrix,
         inverse_dynamics,
         forward_dynamics,
+        contact_distribution,
         ground_wrench,
         balance,
         network_matrix,

@@ -25,6 +25,10 @@ Number = Annotated[Scalar, "number"]
 """One scalar."""
 TipTwists = Annotated[Mapping[str, Twist], "tips"]
 """A twist [omega; v of the tip's origin] by the name of its tip; of a velocity alone, omega ``is ZERO``."""
+TipNumbers = Annotated[Sequence[Scalar], "tip numbers"]
+"""One scalar for every tip, in the order of limbs."""
+TipWrenches = Annotated[Sequence[Wrench], "tip wrenches"]
+"""One wrench for every tip, in the order of limbs."""
 Columns = Annotated[list[Any], "columns"]
 """A result: a matrix by its columns, each a list, a vector or a twist."""
 
@@ -54,6 +58,14 @@ def _pose(x: Sequence[Scalar]) -> Pose:
 
 def _twist(x: Sequence[Scalar]) -> Twist:
     return Twist(Vector(*x[:3]) if len(x) == 6 else ZERO, Vector(*x[-3:]))
+
+
+def _wrench(x: Sequence[Scalar]) -> Wrench:
+    return Wrench(Vector(*x[:3]), Vector(*x[3:]))
+
+
+def _wrenches(x: Sequence[Scalar]) -> list[Wrench]:
+    return [_wrench(x[k : k + 6]) for k in range(0, len(x), 6)]
 
 
 def _one(record: Callable[[Sequence[Scalar]], Any]) -> Callable[..., Any]:
@@ -119,7 +131,9 @@ KINDS: dict[Any, Kind] = {
     Pose: Kind("(..., 4, 4)", lambda robot: (4, 4), _one(_pose)),
     Vector: Kind("(..., 3)", lambda robot: (3,), _one(lambda x: Vector(*x))),
     Twist: Kind("(..., 6)", lambda robot: (6,), _one(_twist)),
-    Wrench: Kind("(..., 6)", lambda robot: (6,), _one(lambda x: Wrench(Vector(*x[:3]), Vector(*x[3:])))),
+    Wrench: Kind("(..., 6)", lambda robot: (6,), _one(_wrench)),
+    TipNumbers: Kind("(..., tips)", lambda robot: (len(robot.limbs),), _one(list)),
+    TipWrenches: Kind("(..., tips, 6)", lambda robot: (len(robot.limbs), 6), _one(_wrenches)),
     Joints: Kind("(..., n)", lambda robot: (len(robot.joints),), _one(list)),
     Number: Kind("(...)", lambda robot: (), _one(lambda x: x[0])),
     TipTwists: Kind("by tip (..., 6)", lambda robot: (), _tip_records, _tip_arrays),
