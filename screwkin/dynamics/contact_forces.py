@@ -12,7 +12,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.scalar import is_jax
 from screwkin.algebra.se3 import as_array
 from screwkin.dynamics.contact import ContactPatch, contact_distribution, contact_points, standing
-from screwkin.dynamics.friction import SIDES, Pressed, pyramids, within_friction
+from screwkin.dynamics.friction import Grip, limited, pyramids
 from screwkin.dynamics.newton_euler import GRAVITY
 from screwkin.errors import InputError, NoSolutionError, ShapeError, UnknownNameError, expect
 from screwkin.kinematics.body import frame_pose
@@ -107,7 +107,7 @@ def contact_forces(
         soled = {robot.limb(sole.limb).tip for sole in robot.soles}
         own = {patch: patch.friction is None and patch.tip in soled for patch in chosen}
         chosen = tuple(replace(p, friction=float(friction)) if own[p] else p for p in chosen)
-    limited = any(patch.friction is not None for patch in chosen)
+    rough = any(patch.friction is not None for patch in chosen)
     unlimited = tuple(replace(patch, friction=None) for patch in chosen)
     zero = np.zeros(6)
     motion = {
@@ -124,11 +124,11 @@ def contact_forces(
     shares: Any = contact_distribution(robot, state, weights=by_tip, internal=wished, **motion)
     if not any(is_jax(x) for x in (shares["wrenches"], by_tip)):
         _refuse_unsupported(chosen, by_tip, shares["spread"][..., 0], robot)
-    elif limited:
+    elif rough:
         raise InputError("contact_forces computes friction of NumPy arrays; leave it out, or give these")
-    if limited:
+    if rough:
         inside = _inside(robot, state, chosen, by_tip, shares["wrenches"])
-        if inside is not None:
+        if (inside != shares["wrenches"]).any():
             every = np.zeros((*inside.shape[:-2], len(robot.limbs), 6))
             every[..., [robot.tip_names.index(patch.tip) for patch in chosen], :] = inside
             shares = contact_distribution(robot, state, weights=by_tip, internal=every, **motion)
@@ -241,43 +241,27 @@ def _refuse_unsupported(patches: Sequence[ContactPatch], weights: Array, spread:
 
 def _inside(
     robot: Robot, state: State, patches: Sequence[ContactPatch], weights: Array, wrenches: Array
-) -> Array | None:
-    """The wrenches (..., contacts, 6) within friction nearest to given ones; None where all are within."""
-    batch = wrenches.shape[:-2]
-    T = [np.broadcast_to(frame_pose(robot, state, p.tip), (*batch, 4, 4)).reshape(-1, 4, 4) for p in patches]
-    places = [robot.tip_names.index(patch.tip) for patch in patches]
-    weight = np.broadcast_to(weights, (*batch, weights.shape[-1])).reshape(-1, weights.shape[-1])[:, places]
-    every, feet = wrenches.reshape(-1, *wrenches.shape[-2:]), ", ".join(patch.tip for patch in patches)
-    found, changed = every.copy(), False
-    for k in range(len(every)):
-        pressed = _pressed(robot, patches, [pose[k] for pose in T], weight[k])
-        forces = pressed.least(every[k])
-        if not pressed.violated(forces):
-            continue
-        nearest = within_friction(pressed, forces)
-        if nearest is None:
-            where = f"sample {', '.join(str(int(i)) for i in np.unravel_index(k, batch))}: " if batch else ""
-            raise NoSolutionError(
-                f"{where}no forces within friction at {feet} supply what the motion needs: it would slip, "
-                "tip over or leave the floor"
-            )
-        found[k], changed = pressed.of_point_forces(nearest, len(patches)), True
-    return found.reshape(wrenches.shape) if changed else None
+) -> Array:
+    """The wrenches (..., contacts, 6) within friction nearest to given ones."""
+    batch, places = wrenches.shape[:-2], [robot.tip_names.index(patch.tip) for patch in patches]
+    poses = [
+        np.broadcast_to(frame_pose(robot, state, patch.tip), (*batch, 4, 4)).reshape(-1, 4, 4)
+        for patch in patches
+    ]
+    own = np.broadcast_to(weights[..., places], (*batch, len(places))).reshape(-1, len(places))
+    grips = [_grip(robot, patch) for patch in patches]
+    found, failing = limited(grips, poses, own, wrenches.reshape(-1, len(places), 6))
+    if failing is not None:
+        index = ", ".join(str(int(i)) for i in np.unravel_index(failing, batch)) if batch else ""
+        raise NoSolutionError(
+            f"{f'sample {index}: ' if batch else ''}no forces within friction at "
+            f"{', '.join(patch.tip for patch in patches)} supply what the motion needs: it would slip, tip "
+            "over or leave the floor"
+        )
+    return found.reshape(wrenches.shape)
 
 
-def _pressed(
-    robot: Robot, patches: Sequence[ContactPatch], poses: Sequence[Array], weights: Array
-) -> Pressed:
-    """The points of the contacts of one sample that take part."""
-    rows: list[tuple[int, Array, Array, Array, float]] = []
-    for k, (patch, T) in enumerate(zip(patches, poses, strict=True)):
-        if weights[k] > 0:
-            faces = np.zeros((SIDES, 3))
-            if patch.friction is not None:
-                faces = pyramids(T[:3, :3] @ np.array(patch.normal), patch.friction)
-            points = contact_points(robot, patch)
-            for point in points:
-                arm = T[:3, :3] @ np.array([*point], dtype=float)
-                rows.append((k, arm, T[:3, 3] + arm, faces, weights[k] / len(points)))
-    contact, arms, places, faces_, weight = zip(*rows, strict=True)
-    return Pressed(np.array(contact), np.array(arms), np.array(places), np.array(faces_), np.array(weight))
+def _grip(robot: Robot, patch: ContactPatch) -> Grip:
+    points = np.array(as_array(contact_points(robot, patch)), dtype=float)
+    limits = np.zeros((0, 3)) if patch.friction is None else pyramids(np.array(patch.normal), patch.friction)
+    return Grip(points, limits)

@@ -10,7 +10,9 @@ Source: C. L. Lawson, R. J. Hanson, Solving Least Squares Problems (1974), chapt
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -20,45 +22,86 @@ SIDES = 8
 """Of the polygon that is inscribed in the circle of friction: at most 8 % of it are left out."""
 ROUNDING = 1e-9
 """Share of the largest force by which a limit may be passed: rounding."""
+INFEASIBLE = 1e-7
+"""What is left of a least distance program of forces of order 1 that has no solution."""
 
 
 @dataclass(frozen=True, eq=False)
-class Pressed:
-    """The points of all contacts of one sample.
+class Grip:
+    """The points of a contact and what limits their forces, in the frame of its tip.
 
     Attributes:
-        contact: (points,) index of the contact.
-        arms: (points, 3) from the tip of the contact, world axes [m].
-        places: (points, 3) [m], world axes, from any origin.
-        faces: (points, SIDES, 3): a force f is within friction where no row times f is negative; rows of
-            zeros limit nothing.
-        weight: (points,) of the contact.
+        points: (K, 3) [m].
+        faces: (SIDES, 3): a force f is within friction where no row times f is negative; (0, 3): no limits.
     """
 
-    contact: Array
-    arms: Array
-    places: Array
+    points: Array
     faces: Array
-    weight: Array
 
-    def of_point_forces(self, forces: Array, contacts: int) -> Array:
-        """Wrenches (contacts, 6) at the tips, of forces (points, 3)."""
-        wrenches = np.zeros((contacts, 6))
-        np.add.at(wrenches, self.contact, np.hstack([np.cross(self.arms, forces), forces]))
-        return wrenches
+    @cached_property
+    def least(self) -> Array:
+        """(3 K, 6): the least forces of the points that sum to a wrench at the tip."""
+        return np.asarray(np.linalg.pinv(grasp(self.points)))
 
-    def least(self, wrenches: Array) -> Array:
-        """The least forces (points, 3) of the points that sum to each contact's wrench (contacts, 6)."""
-        forces = np.zeros_like(self.arms)
-        for k, wrench in enumerate(wrenches):
-            own = self.contact == k
-            forces[own] = (np.linalg.pinv(grasp(self.arms[own])) @ wrench).reshape(-1, 3)
-        return forces
+    def forces(self, R: Array, wrenches: Array) -> Array:
+        """The least forces (..., K, 3) in tip axes of wrenches (..., 6), whose axes R (..., 3, 3) leads to."""
+        back = R.swapaxes(-1, -2)
+        parts = [(back @ wrenches[..., part, None])[..., 0] for part in (slice(3), slice(3, 6))]
+        found = np.concatenate(parts, axis=-1) @ self.least.T
+        return np.asarray(found.reshape(*found.shape[:-1], len(self.points), 3))
 
-    def violated(self, forces: Array) -> bool:
-        """True if a force lies outside its limits."""
-        inside = np.einsum("pfk,pk->pf", self.faces, forces)
-        return bool(inside.min(initial=0.0) < -ROUNDING * np.abs(forces).max(initial=0.0))
+    def violated(self, forces: Array) -> Array:
+        """Where (...,) forces (..., K, 3) lie outside their limits."""
+        if not len(self.faces):
+            return np.zeros(forces.shape[:-2], dtype=bool)
+        inside = (forces @ self.faces.T).min(axis=(-1, -2))
+        return np.asarray(inside < -ROUNDING * np.abs(forces).max(axis=(-1, -2)))
+
+
+def limited(
+    grips: Sequence[Grip], poses: Sequence[Array], weights: Array, wrenches: Array
+) -> tuple[Array, int | None]:
+    """Wrenches within friction, nearest to given ones.
+
+    Args:
+        grips: of every contact.
+        poses: (count, 4, 4) of every contact's tip.
+        weights: (count, contacts), 0 where one is not in contact.
+        wrenches: (count, contacts, 6) at the tips, world axes [N m, N].
+
+    Returns:
+        The wrenches, and the first sample for which there are none.
+    """
+    forces = [
+        grip.forces(T[:, :3, :3], wrenches[:, k])
+        for k, (grip, T) in enumerate(zip(grips, poses, strict=True))
+    ]
+    beyond = [
+        (grip.violated(f)) & (weights[:, k] > 0)
+        for k, (grip, f) in enumerate(zip(grips, forces, strict=True))
+    ]
+    found = wrenches
+    for sample in np.flatnonzero(np.any(beyond, axis=0)):
+        if found is wrenches:
+            found = wrenches.copy()
+        on = [k for k in range(len(grips)) if weights[sample, k] > 0]
+        R = [poses[k][sample, :3, :3] for k in on]
+        own = [grips[k] for k in on]
+        share = [
+            np.full(len(g.points), weights[sample, k] / len(g.points)) for g, k in zip(own, on, strict=True)
+        ]
+        nearest = within_friction(
+            np.vstack([poses[k][sample, :3, 3] + g.points @ r.T for k, g, r in zip(on, own, R, strict=True)]),
+            [g.faces @ r.T for g, r in zip(own, R, strict=True) for _ in g.points],
+            np.concatenate(share),
+            np.vstack([forces[k][sample] @ r.T for k, r in zip(on, R, strict=True)]),
+        )
+        if nearest is None:
+            return found, int(sample)
+        ends = np.cumsum([len(g.points) for g in own])[:-1]
+        for k, g, r, f in zip(on, own, R, np.split(nearest, ends), strict=True):
+            found[sample, k] = grasp(g.points @ r.T) @ f.ravel()
+    return found, None
 
 
 def pyramids(normal: Array, friction: float) -> Array:
@@ -71,15 +114,16 @@ def pyramids(normal: Array, friction: float) -> Array:
 
 def grasp(places: Array) -> Array:
     """(6, 3 points): the wrench about the origin [m; f] of forces at places (points, 3)."""
-    columns = [np.vstack([np.cross(place, np.eye(3)).T, np.eye(3)]) for place in places]
-    return np.hstack(columns) if columns else np.zeros((6, 0))
+    return np.hstack([np.vstack([np.cross(place, np.eye(3)).T, np.eye(3)]) for place in places])
 
 
-def within_friction(pressed: Pressed, forces: Array) -> Array | None:
-    """The forces (points, 3) within friction that are nearest to given ones and have the same sum.
+def within_friction(places: Array, faces: Sequence[Array], weight: Array, forces: Array) -> Array | None:
+    """The forces within friction that are nearest to given ones and have the same sum.
 
     Args:
-        pressed: the points.
+        places: of the points (points, 3) [m].
+        faces: of every point, as those of a ``Grip``, in the axes of the places.
+        weight: of every point (points,): the larger, the less its change counts.
         forces: that sum to what is needed (points, 3) [N].
 
     Returns:
@@ -87,22 +131,20 @@ def within_friction(pressed: Pressed, forces: Array) -> Array | None:
     """
     from scipy.optimize import nnls
 
-    scale, size = np.repeat(np.sqrt(pressed.weight), 3), max(float(np.abs(forces).max()), 1e-300)
-    middle = pressed.places - pressed.places.mean(axis=0)
-    length = max(float(np.abs(middle).max()), 1e-9)
-    A = grasp(middle / length) * scale
-    _, values, V = np.linalg.svd(A)
+    scale, size = np.repeat(np.sqrt(weight), 3), max(float(np.abs(forces).max()), 1e-300)
+    middle = places - places.mean(axis=0)
+    _, values, V = np.linalg.svd(grasp(middle / max(float(np.abs(middle).max()), 1e-9)) * scale)
     free = scale[:, None] * V[int((values > 1e-10 * values[0]).sum()) :].T
-    limited = np.abs(pressed.faces).sum(axis=(1, 2)) > 0
-    faces = np.zeros((int(limited.sum()) * SIDES, len(scale)))
-    for row, point in enumerate(np.flatnonzero(limited)):
-        faces[row * SIDES : (row + 1) * SIDES, 3 * point : 3 * point + 3] = pressed.faces[point]
-    G, h = faces @ free, -faces @ forces.ravel() / size
+    limits = np.zeros((sum(map(len, faces)), len(scale)))
+    row = 0
+    for point, own in enumerate(faces):
+        limits[row : row + len(own), 3 * point : 3 * point + 3] = own
+        row += len(own)
+    G, h = limits @ free, -limits @ forces.ravel() / size
     E, f = np.vstack([G.T, h]), np.zeros(free.shape[1] + 1)
     f[-1] = 1.0
     u, left = nnls(E, f)
-    r = E @ u - f
-    if left < 1e-7:
+    if left < INFEASIBLE:
         return None
-    moved = forces.ravel() / size - free @ (r[:-1] / r[-1])
-    return np.asarray(size * moved.reshape(-1, 3))
+    r = E @ u - f
+    return np.asarray(forces - size * (free @ (r[:-1] / r[-1])).reshape(-1, 3))
