@@ -31,6 +31,19 @@ class ZmpRecord:
     ankle: Array
 
 
+@dataclass(frozen=True, eq=False)
+class ForceRecord:
+    """Forces measured, averaged over windows; rows (M,) are at their middle.
+
+    time (M,) [s]; foot_force (M, feet, 3): of the floor on the legs' last links [N]; torque (M, n) of the
+    motors [N m].
+    """
+
+    time: Array
+    foot_force: Array
+    torque: Array
+
+
 @dataclass(frozen=True)
 class Slip:
     """Horizontal motion of soles that should stand still.
@@ -65,6 +78,18 @@ def zmp_record(run: Run, trajectory: Trajectory, window: float = WINDOW) -> ZmpR
         planned=_window_mean(planned, count)[rows],
         ankle=_zmp(_window_mean(run.ankle_wrench[before].sum(axis=1), count))[rows],
     )
+
+
+def force_record(run: Run, window: float = WINDOW) -> ForceRecord:
+    """Forces of feet and torques of motors from the trajectory's begin on, up to a fall."""
+    count = max(1, round(window / run.dt))
+    before = _before_fall(run)
+    if before.sum() < count:
+        return ForceRecord(np.zeros(0), run.foot_force[:0], run.torque[:0])
+    time = _window_mean((run.time - run.dt)[before], count)
+    rows = time >= 0.0
+    force, torque = (_window_mean(x[before], count)[rows] for x in (run.foot_force, run.torque))
+    return ForceRecord(time[rows], force, torque)
 
 
 def slip(run: Run, trajectory: Trajectory, legs: tuple[str, ...]) -> Slip:
