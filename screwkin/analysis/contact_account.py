@@ -19,6 +19,7 @@ from screwkin.dynamics.support import sole_corners
 from screwkin.errors import InputError
 from screwkin.files import read_file
 from screwkin.kinematics.limits import limited_joints
+from screwkin.kinematics.mass import GRAVITY
 from screwkin.model.state import State
 from screwkin.sim.compliant import SpringServos
 from screwkin.sim.measure import ForceRecord, force_record
@@ -76,7 +77,7 @@ class ForceAccount:
 
     @property
     def _pressing(self) -> Array:
-        weight = PRESSING * 9.81 * float(self.account.robot.mass)
+        weight = PRESSING * GRAVITY * float(self.account.robot.mass)
         return np.asarray(self.forces.wrenches[..., 5] > weight)
 
     @cached_property

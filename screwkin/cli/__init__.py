@@ -26,7 +26,7 @@ VERBS = {
     "convert": "Convert a robot between screw tables, URDF and DH tables.",
     "compare": "The screw model of a robot against its Denavit-Hartenberg model.",
     "ik": "Inverse kinematics methods compared on a limb: iterations, coverage, time.",
-    "forces": "Statics by Davies' method: efforts, pin forces and contact wrenches that balance loads.",
+    "forces": "Efforts and forces that balance loads, or that feet and joints bear along a trajectory.",
     "walk": "Plan the trajectory of a gait, with plots and a report.",
     "zmp": "Recompute CoM, ZMP, margins and spikes of a trajectory.",
     "validate": "Simulate a trajectory and give a verdict.",

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 import typer
 
 from screwkin.algebra.arrays import Array
-from screwkin.cli.options import AsJson, numbers_of
+from screwkin.cli.forces_along import FRICTION, VALIDATED, Wanted, forces_along
+from screwkin.cli.options import AsJson, OutputFolder, numbers_of
 from screwkin.cli.output import aligned, print_json
 from screwkin.errors import InputError
 from screwkin.mechanism.action_choice import ActionChoice, action_choice
@@ -25,7 +27,8 @@ def forces(
     robot: Annotated[
         str,
         typer.Argument(
-            metavar="ROBOT", help="A bundled robot's name, or a .toml, .urdf, MJCF .xml or DH .csv file."
+            metavar="ROBOT|TRAJ",
+            help="A bundled robot's name, or a .toml, .urdf, MJCF .xml or DH .csv file; or a trajectory.npz.",
         ),
     ],
     load: Annotated[
@@ -53,11 +56,48 @@ def forces(
         typer.Option(help="A tip on the floor or a held closure; may be repeated. Default: the soles."),
     ] = None,
     posture: Annotated[str | None, typer.Option(help="A posture of the table; default home.")] = None,
+    friction: Annotated[
+        float | None, typer.Option(help="TRAJ: coefficient of friction of the floor; default 0.8.")
+    ] = None,
+    pull: Annotated[
+        bool, typer.Option("--pull", help="TRAJ: no friction and no limits: the floor may pull.")
+    ] = False,
+    engine: Annotated[
+        str | None,
+        typer.Option(help="TRAJ: pybullet, mujoco or none, beside the plan; default: as it was validated."),
+    ] = None,
+    plots: Annotated[bool, typer.Option(help="TRAJ: draw the pictures.")] = True,
+    output: OutputFolder = None,
     as_json: AsJson = False,
 ) -> int:
-    """Statics by Davies' method: efforts, pin forces and contact wrenches that balance loads."""
+    """Of a robot what balances loads, by Davies' method; of a trajectory what feet and joints bear along it.
+
+    A trajectory's forces go to forces.npz and pictures, beside those of the simulator that validated it. Exit
+    code 3 where no forces within friction carry the motion.
+    """
+    of_robot = {
+        "--load": load, "--weights": weights, "--down": down, "--impose": impose, "--active": active,
+        "--contact": contact, "--posture": posture,
+    }  # fmt: skip
+    of_trajectory = {
+        "--friction": friction, "--pull": pull, "--engine": engine, "--no-plots": not plots,
+        "--output": output,
+    }  # fmt: skip
+    if Path(robot).suffix == ".npz":
+        _refuse(of_robot, f"for robots, and {robot} is a trajectory")
+        if pull and friction is not None:
+            raise InputError("--pull is without friction; leave out one of --pull and --friction")
+        limit = None if pull else FRICTION if friction is None else friction
+        return forces_along(Path(robot), Wanted(limit, engine or VALIDATED, plots, output, as_json))
+    _refuse(of_trajectory, f"for a trajectory.npz, and {robot} is none")
     table = load_robot(robot)
     return _statics(table, posture, load or [], weights, down, impose or [], active, contact, as_json)
+
+
+def _refuse(options: Mapping[str, Any], why: str) -> None:
+    given = [name for name, value in options.items() if value not in (None, False)]
+    if given:
+        raise InputError(f"{', '.join(given)}: {why}; leave it out")
 
 
 def _statics(

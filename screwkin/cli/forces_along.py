@@ -20,6 +20,8 @@ from screwkin.files import atomic_write_bytes, npz_bytes
 from screwkin.trajectory import load_trajectory
 
 NONE, VALIDATED = "none", "validated"
+FRICTION = 0.8
+"""Coefficient of friction of the floor where none is given: rubber on wood."""
 
 
 @dataclass(frozen=True)
@@ -30,7 +32,7 @@ class Wanted:
     of the validation beside the trajectory, if there is one.
     """
 
-    friction: float | None = 0.8
+    friction: float | None = FRICTION
     engine: str = VALIDATED
     plots: bool = True
     output: Path | None = None
@@ -159,7 +161,6 @@ def _draw(forces: ForceAccount, folder: Path) -> list[Path]:
         "pressure": lambda: pictures.pressure(forces),
         "efforts": lambda: pictures.joint_efforts(forces),
         "efforts_arms": lambda: pictures.joint_efforts(forces, "arm"),
-        "effort_use": lambda: pictures.effort_use(forces),
     }
     saved = []
     with progress_bar("pictures") as done:

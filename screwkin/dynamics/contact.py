@@ -17,7 +17,6 @@ from screwkin.algebra.screws import Wrench, wrench_at
 from screwkin.algebra.se3 import NO_TWIST, ZERO, Pose, Twist, Vector, cross, leaves
 from screwkin.dynamics.loops import Admitted, actuated_joints, refuse_loops
 from screwkin.dynamics.newton_euler import (
-    GRAVITY,
     NO_WRENCH,
     Bodies,
     carried,
@@ -27,6 +26,7 @@ from screwkin.dynamics.newton_euler import (
 from screwkin.errors import InputError
 from screwkin.kinematics.formula import formula, refusing
 from screwkin.kinematics.kinds import Joints, Number, TipNumbers, TipWrenches
+from screwkin.kinematics.mass import GRAVITY
 from screwkin.model.records import Inertia
 from screwkin.model.robot import Robot
 

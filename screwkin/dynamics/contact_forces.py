@@ -13,9 +13,9 @@ from screwkin.algebra.scalar import is_jax
 from screwkin.algebra.se3 import as_array
 from screwkin.dynamics.contact import ContactPatch, contact_distribution, contact_points, standing
 from screwkin.dynamics.friction import Grip, limited, pyramids
-from screwkin.dynamics.newton_euler import GRAVITY
 from screwkin.errors import InputError, NoSolutionError, ShapeError, UnknownNameError, expect
 from screwkin.kinematics.body import frame_pose
+from screwkin.kinematics.mass import GRAVITY
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 

@@ -44,7 +44,7 @@ class Grip:
         return np.asarray(np.linalg.pinv(grasp(self.points)))
 
     def forces(self, R: Array, wrenches: Array) -> Array:
-        """The least forces (..., K, 3) in tip axes of wrenches (..., 6), whose axes R (..., 3, 3) leads to."""
+        """The least forces (..., K, 3) of wrenches (..., 6), in axes where the tip's are R (..., 3, 3)."""
         back = R.swapaxes(-1, -2)
         parts = [(back @ wrenches[..., part, None])[..., 0] for part in (slice(3), slice(3, 6))]
         found = np.concatenate(parts, axis=-1) @ self.least.T

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from screwkin.analysis.contact_account import ForceAccount
 from screwkin.dynamics.support import sole_corners
 from screwkin.report.motion import joints_shown
@@ -80,21 +78,3 @@ def joint_efforts(forces: ForceAccount, kind: str = "leg") -> Figure | None:
             one.plot([], [], color=PLAIN, linewidth=2.8, alpha=0.3, label="simulated")
         one.set_ylabel(f"{shown(limb.name)} [N m]")
     return finished(figure, account, columns=4)
-
-
-def effort_use(forces: ForceAccount) -> Figure:
-    """Largest effort of every joint as a share of its limit."""
-    from screwkin.report.style import joint_colours, new_figure
-
-    names, colours = forces.account.robot.joint_names, joint_colours(forces.account)
-    figure, one = new_figure(0.9 + 0.2 * len(names))
-    values = [100 * forces.use[name] for name in names]
-    one.barh(range(len(names)), values, color=[colours[name] for name in names], height=0.7)
-    one.axvline(100.0, color="#B00020", linewidth=1.0)
-    one.set_xlim(0.0, max(108.0, 1.15 * float(np.max(values))))
-    one.set_xlabel("largest effort [% of limit]")
-    one.grid(True, axis="x")
-    one.grid(False, axis="y")
-    one.set_yticks(range(len(names)), [shown(name) for name in names], fontsize=7)
-    one.invert_yaxis()
-    return figure
