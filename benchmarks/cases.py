@@ -26,7 +26,7 @@ class Case:
     """A workload at one size.
 
     Attributes:
-        workload: W1 to W7.
+        workload: W1 to W8.
         title: what is computed.
         count: samples, by which times are divided.
         unit: what a sample is.
@@ -78,7 +78,15 @@ def few(provide: Provide, robot: Robot, given: Any, count: int) -> Contestants:
 
 def cases(robot: Robot, sizes: Sizes, wanted: set[str], peers: set[str] | None = None) -> Iterator[Case]:
     """The cases of the wanted workloads; ``peers`` limits who contends beside this library."""
-    makers = {"W1": _rates, "W2": _reach, "W3": _positions, "W4": _balance, "W5": _gait, "W6": _map}
+    makers = {
+        "W1": _rates,
+        "W2": _reach,
+        "W3": _positions,
+        "W4": _balance,
+        "W5": _gait,
+        "W6": _map,
+        "W8": _contacts,
+    }
     for name, make in makers.items():
         if name in wanted:
             for case in make(robot, sizes):
@@ -170,6 +178,12 @@ def _balance(robot: Robot, sizes: Sizes) -> Iterator[Case]:
             "mujoco": partial(mujoco.balance, heavy, given),
         },
     )
+
+
+def _contacts(robot: Robot, sizes: Sizes) -> Iterator[Case]:
+    given = workloads.dynamic(workloads.walked(robot, sizes.balance), sizes.balance)
+    title = "wrenches of both feet and all joint efforts of a walk"
+    yield Case("W8", title, len(given.q), "sample", {ours.NAME: partial(ours.contacts, robot, given)})
 
 
 def _gait(robot: Robot, sizes: Sizes) -> Iterator[Case]:

@@ -240,6 +240,27 @@ def balance(robot: Robot, given: Dynamic) -> Contestants:
     return contestants
 
 
+def contacts(robot: Robot, given: Dynamic) -> Contestants:
+    """W8."""
+    state, feet = sk.State(given.T_world_base, given.q), [robot.limb(sole.limb).tip for sole in robot.soles]
+    flags = dict(zip(feet, given.contact.T, strict=True))
+
+    def run(robot: Robot) -> Any:
+        moving = (given.qd, given.qdd, flags, None, given.twist, given.acceleration)
+        return sk.contact_forces(robot, state, *moving)
+
+    def result(found: Any) -> Result:
+        return {"wrenches": found.wrenches, "efforts": found.efforts}
+
+    bound = sk.bind(robot, "contact_distribution", optional=("base_twist", "base_acceleration"))
+    weights = np.zeros((len(given.q), len(robot.limbs)))
+    weights[:, [robot.tip_names.index(foot) for foot in feet]] = given.contact
+    told = {"qd": given.qd, "qdd": given.qdd, "weights": weights}
+    told |= {"base_twist": given.twist, "base_acceleration": given.acceleration}
+    contestants = _twice(robot, run, result, "contact_distribution")
+    return contestants | {f"{NAME}, bind": Contestant(lambda: bound(state, **told), result)}
+
+
 def gait(robot: Robot, seconds: float, rate: float) -> Contestants:
     """W5: positions, rates, accelerations and ZMP of a walk of about so many seconds."""
     chosen = sk.load_gait("walk").replace(rate=rate)

@@ -14,7 +14,7 @@ from benchmarks.timing import Timing, interleaved
 from screwkin.model.robot import Robot
 
 VERSIONS = ("screwkin", "numpy", "scipy", "jax", "jaxlib", "pin", "mujoco")
-WORKLOADS = ("W1", "W2", "W3", "W4", "W5", "W6", "W7")
+WORKLOADS = ("W1", "W2", "W3", "W4", "W5", "W6", "W7", "W8")
 Say = Callable[[str], None]
 
 

@@ -62,7 +62,7 @@ class Stance:
 
 @dataclass(frozen=True, eq=False)
 class Dynamic:
-    """W4: T samples of states, rates and accelerations; twists of the base in world axes."""
+    """W4, W8: T samples of states, rates, accelerations; twists of the base, world axes; feet in contact."""
 
     T_world_base: Array
     q: Array
@@ -70,6 +70,7 @@ class Dynamic:
     qdd: Array
     twist: Array
     acceleration: Array
+    contact: Array
 
 
 def size(given: Motion | Reach | Stance | Dynamic) -> int:
@@ -143,6 +144,7 @@ def stance(robot: Robot, trajectory: sk.Trajectory, count: int) -> Stance:
 
 
 def dynamic(trajectory: sk.Trajectory, count: int) -> Dynamic:
-    """W4: the walk with its rates and accelerations."""
+    """W4, W8: the walk with its rates and accelerations."""
     arrays = (trajectory.T_world_base, trajectory.q, trajectory.qd, trajectory.qdd)
-    return Dynamic(*(a[:count] for a in (*arrays, trajectory.base_twist, trajectory.base_acceleration)))
+    moving = (*arrays, trajectory.base_twist, trajectory.base_acceleration, trajectory.contact)
+    return Dynamic(*(a[:count] for a in moving))
