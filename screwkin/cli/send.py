@@ -28,10 +28,12 @@ from screwkin.servo.servo_map import ServoMap
 from screwkin.servo.virtual.bus import SimulatedClock, VirtualBus
 from screwkin.servo.virtual.faults import InjectedFault
 from screwkin.servo.virtual.robot import virtual_servos
+from screwkin.servo.watch import Thresholds
 
 _STATES: tuple[EndState, ...] = ("hold", "limp")
 _INTERRUPTED = 130
 _REFUSED = 4
+_LONGEST_NOTICE = 2.0  # s
 _RETURN_DELAY = 500e-6  # s, of a servo as it comes from the maker
 
 
@@ -44,6 +46,9 @@ def send(
     rate: Annotated[float, typer.Option(help="Frames per second.")] = 50.0,
     torque: Annotated[float, typer.Option(help="Share of the servos' torque, 0 to 1.")] = 1.0,
     far: Annotated[float, typer.Option(help="Farthest a joint may be from its first goal, rad.")] = 1.0,
+    notice: Annotated[
+        float, typer.Option(help="Seconds within which a blocked joint must be noticed.")
+    ] = Thresholds.notice,
     on_fault: Annotated[str, typer.Option(help="After a fault: hold or limp.")] = "hold",
     at_end: Annotated[str, typer.Option(help="After the last frame: hold or limp.")] = "hold",
     rs485: Annotated[bool, typer.Option("--rs485", help="Let the kernel switch direction.")] = False,
@@ -66,7 +71,12 @@ def send(
     if faults and not virtual:
         raise InputError("--inject-fault is for virtual servos; add --virtual")
     settings = PlaySettings(
-        rate=rate, torque=torque, far=_distance(far), on_fault=_state(on_fault), at_end=_state(at_end)
+        rate=rate,
+        torque=torque,
+        far=_distance(far),
+        on_fault=_state(on_fault),
+        at_end=_state(at_end),
+        thresholds=Thresholds(notice=_notice(notice)),
     )
     may = ready(trajectory, robot or None, settings)
     servos, bounds, frames = may.servos, may.bounds, may.frames
@@ -128,7 +138,7 @@ def virtual_bus(robot: Robot, faults: Sequence[InjectedFault] = (), seed: int = 
     servos, clock = ServoMap.of(robot), SimulatedClock()
     mounted = virtual_servos(robot, return_delay=_RETURN_DELAY)
     line = VirtualBus(mounted, clock, servos.baud, faults, seed, adapter=ADAPTER)
-    return Bus(line, servos.protocol, servos.baud, clock)
+    return Bus(line, servos.protocol, servos.baud, clock, opener=line.reopened)
 
 
 @contextmanager
@@ -185,6 +195,12 @@ def _state(text: str) -> EndState:
         if text == state:
             return state
     raise UnknownNameError("state of the servos", text, _STATES)
+
+
+def _notice(seconds: float) -> float:
+    if not 0.0 < seconds <= _LONGEST_NOTICE:
+        raise InputError(f"--notice {seconds!r} is no time; expected seconds up to {_LONGEST_NOTICE:g}")
+    return seconds
 
 
 def _distance(far: float) -> float:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+from screwkin.servo.bus import Grouped
 from screwkin.servo.profiles import Profile
 from screwkin.servo.protocols import codec
 
@@ -25,16 +28,17 @@ def block_of(profile: Profile) -> tuple[int, int, tuple[str, ...]]:
 
 @dataclass(frozen=True)
 class Budget:
-    """Times [s] of one frame's goals, and of reading one servo; servos on the bus."""
+    """Times [s] of one frame's goals, of reading one servo, and one more with it; servos on the bus."""
 
     write: float
     read: float
+    more: float
     servos: int
 
     @property
     def full_rate(self) -> float:
         """Frames per second at which every servo can be read in every frame."""
-        return 1.0 / (self.write + self.servos * self.read)
+        return 1.0 / (self.write + self.read + (self.servos - 1) * self.more)
 
     @property
     def limit(self) -> float:
@@ -43,11 +47,36 @@ class Budget:
 
     def reads(self, rate: float) -> int:
         """Servos that can be read in a frame at so many frames per second."""
-        return max(0, min(self.servos, int((1.0 / rate - self.write) / self.read + 1e-9)))
+        spare = 1.0 / rate - self.write - self.read
+        return min(self.servos, 1 + int(spare / self.more + 1e-9)) if spare >= -1e-12 else 0
+
+    def interval(self, rate: float) -> float:
+        """Time [s] from one reading of a servo to the next at so many frames per second; infinite: none."""
+        reads = self.reads(rate)
+        return math.ceil(self.servos / reads) / rate if reads else math.inf
+
+    def fastest(self, interval: float, below: float) -> int | None:
+        """Most frames per second below a rate at which every servo is read so often [s]; None: none."""
+        rates = range(math.ceil(below) - 1, 0, -1)
+        return next((rate for rate in rates if self.interval(rate) <= interval), None)
+
+
+def grouping(profiles: Sequence[Profile]) -> Grouped:
+    """How the servos of a bus can be asked in one packet: all of one model that has one for it."""
+    if len({profile.model for profile in profiles}) > 1 or len(profiles) < 2:
+        return "none"
+    if profiles[0].has_sync_read:
+        return "sync"
+    return "bulk" if profiles[0].has_bulk_read else "none"
 
 
 def budget(
-    profiles: tuple[Profile, ...], baud: int, return_delay: float = 500e-6, adapter: float = ADAPTER
+    profiles: tuple[Profile, ...],
+    baud: int,
+    return_delay: float = 500e-6,
+    adapter: float = ADAPTER,
+    answer: float | None = None,
+    again: float | None = None,
 ) -> Budget:
     """The budget of a bus.
 
@@ -56,6 +85,8 @@ def budget(
         baud: bits per second.
         return_delay: time [s] that a servo waits before it answers; 500 microseconds when new.
         adapter: time [s] that the adapter adds to an answer.
+        answer: time [s] from a command to its answer, where it was measured.
+        again: the same of a further one in the same frame.
     """
     byte = _BITS / baud
     facts = codec(profiles[0].protocol).FACTS
@@ -65,5 +96,8 @@ def budget(
     )
     packets = len({profile.model for profile in profiles})
     longest = max(block_of(profile)[1] for profile in profiles)
-    read = (facts.read_size + facts.answer_size + longest) * byte + return_delay + adapter
-    return Budget((goals + packets * facts.sync_size) * byte, read, len(profiles))
+    more = (facts.answer_size + longest) * byte + return_delay  # an answer that follows another
+    read = facts.read_size * byte + more + adapter if answer is None else answer
+    grouped = grouping(profiles) != "none"
+    write = (goals + packets * facts.sync_size) * byte
+    return Budget(write, read, min(more, read) if grouped else again or read, len(profiles))

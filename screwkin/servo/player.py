@@ -119,13 +119,14 @@ class Player:
             raise InputError(
                 f"{frames.rate:g} frames per second are more than the bus carries: {carried.limit:.0f}"
             )
+        retries, patience = self.bus.retries, self.bus.patience
         pose = self.ready_pose(frames.q[0])
+        self.readings.plan(frames.rate, self.settings.thresholds.interval)
         fault: ServoFault | None = None
         final = Final("unknown", self.bounds.names)
-        retries, patience = self.bus.retries, self.bus.patience
         state, finished = self.settings.on_fault, False
         try:
-            self._tune(patience)
+            self.bus.retries = 0  # in a play nobody waits: a lost reply is asked for again in the next frame
             self._run(frames, pose)
             state, finished = self.settings.at_end, True
         except PlayStopped as stopped:
@@ -137,8 +138,8 @@ class Player:
         except KeyboardInterrupt:
             fault = ServoFault("interrupted", "", -1, self._time(), "stopped by the user")
         finally:
-            self.bus.retries, self.bus.patience = 1, min(patience, 0.005)
-            final = leave(self.gate, self.bus, state, finished)
+            self.bus.retries = 1
+            final = self._leave(state, finished)
             self.bus.retries, self.bus.patience = retries, patience
         faults = (fault,) if fault else ()
         return PlayOutcome(self._frames, self._late, self.watch.max_tracking_error, faults, final, self.log)
@@ -177,10 +178,12 @@ class Player:
             raise SafetyError("the servos are not ready: " + "; ".join(reasons))
         return pose
 
-    def _tune(self, patience: float) -> None:
-        """In a play nobody waits long: a lost reply is asked for again in the next frame."""
-        self.bus.retries = 0
-        self.bus.patience = min(patience, max(0.008, 3.0 * self.bus.statistics.mean))
+    def _leave(self, state: EndState, finished: bool) -> Final:
+        """Leave the servos in a state; where nobody answers, once more with the port opened anew."""
+        final = leave(self.gate, self.bus, state, finished)
+        if final.state == "unknown" and self.bus.reopen(self.settings.thresholds.reopen):
+            return leave(self.gate, self.bus, state, finished)
+        return final
 
     def _run(self, frames: Frames, pose: Array) -> None:
         start = self.bounds.within(pose)
@@ -214,7 +217,7 @@ class Player:
                 times[i] if times is not None else math.nan,
                 goal,
             )
-            self.watch.late(late, self._time())
+            self.watch.frame(goal, late, self._time())
             self._due += period
             self._read(goal)
             if times is not None:

@@ -6,11 +6,13 @@ import math
 from collections import deque
 from collections.abc import Callable
 
-from screwkin.servo.budget import block_of, budget
+from screwkin.errors import SafetyError
+from screwkin.servo.budget import block_of, budget, grouping
 from screwkin.servo.bus import Bus, Grouped
 from screwkin.servo.gate import Bounds
 from screwkin.servo.line import BusError, LineLostError, Reply
 from screwkin.servo.profiles import Profile, physical
+from screwkin.servo.roundtrip import latency_advice, measured
 
 Taken = Callable[[int, Reply], None]
 """Called with joint and answer."""
@@ -27,6 +29,7 @@ class Readings:
     def __init__(self, bus: Bus, bounds: Bounds) -> None:
         self.bus, self.bounds = bus, bounds
         self.blocks = [block_of(profile) for profile in bounds.profiles]
+        self.budget = budget(bounds.profiles, bus.baud)
         self._queue = deque(range(len(bounds.ids)))
 
     def ask(self, k: int) -> Reply:
@@ -53,6 +56,41 @@ class Readings:
         values |= {name: float(raw[name]) for name in ("torque_enable", "torque_limit") if name in raw}
         return values
 
+    def plan(self, rate: float, interval: float) -> None:
+        """Measure how long answers take, wait for them accordingly, and plan the readings by that.
+
+        Args:
+            rate: frames per second.
+            interval: longest time from one reading of a servo to the next [s].
+
+        Raises:
+            SafetyError: servos would be read more rarely, or one has fallen silent. LineLostError.
+        """
+        start, length, _ = self.blocks[0]
+        try:
+            trip = measured(self.bus, self.bounds.ids, start, length)
+        except LineLostError:
+            raise
+        except BusError as error:
+            raise SafetyError(f"the servos are not ready: {error}") from None
+        self.bus.patience = trip.patience
+        self.budget = carried = budget(
+            self.bounds.profiles, self.bus.baud, answer=trip.median, again=trip.most
+        )
+        if carried.interval(rate) <= interval + 1e-9:
+            return
+        reads, apart = carried.reads(rate), carried.interval(rate)
+        often = f"read every {apart:.2f} s" if reads else "read at all"
+        slower = carried.fastest(interval, rate)
+        advice = [latency_advice(self.bus.port)] if trip.is_slow else ["raise the bus's baud rate"]
+        advice += [f"play at --rate {slower}"] if slower else []
+        advice += [f"accept that it is noticed within --notice {2 * apart:.2f} s only"] if reads else []
+        raise SafetyError(
+            f"at {rate:g} frames per second a servo would {'only ' if reads else 'not '}be {often}, and must "
+            f"be every {interval:.2f} s for a blocked joint to be noticed: an answer takes {trip}; "
+            + "; or ".join(advice)
+        )
+
     def torque_is_read(self) -> bool:
         """Whether the torque limit is among what is read of every servo."""
         return all("torque_limit" in names for _, _, names in self.blocks)
@@ -71,14 +109,13 @@ class Readings:
         Raises:
             LineLostError: the port is gone.
         """
-        grouped = self._grouped()
+        grouped = grouping(self.bounds.profiles)
         if grouped != "none":
             self._read_group(grouped, rate, taken, lost)
             return
         again: list[int] = []
-        estimate = self._estimate()
         for count in range(len(self._queue)):
-            spare = min(count + 1.0, 2.0) * estimate  # the next may take longer than the mean
+            spare = self.budget.more if count else self.budget.read  # a further one may take longer
             if self.bus.clock.now() + spare > due:
                 break
             k = self._queue.popleft()
@@ -94,7 +131,7 @@ class Readings:
 
     def _read_group(self, grouped: Grouped, rate: float, taken: Taken, lost: Callable[[int], None]) -> None:
         start, length, _ = self.blocks[0]
-        count = max(1, budget(self.bounds.profiles, self.bus.baud).reads(rate))
+        count = max(1, self.budget.reads(rate))
         chosen = [self._queue[i] for i in range(min(count, len(self._queue)))]
         self._queue.rotate(-len(chosen))
         ids = [self.bounds.ids[k] for k in chosen]
@@ -104,19 +141,6 @@ class Readings:
                 taken(k, replies[id])
             else:
                 lost(k)
-
-    def _grouped(self) -> Grouped:
-        profiles = self.bounds.profiles
-        if len({profile.model for profile in profiles}) > 1:
-            return "none"
-        if profiles[0].has_sync_read:
-            return "sync"
-        return "bulk" if profiles[0].has_bulk_read else "none"
-
-    def _estimate(self) -> float:
-        """Time that one more reading is likely to take [s]."""
-        mean = self.bus.statistics.mean
-        return budget(self.bounds.profiles, self.bus.baud).read if math.isnan(mean) else mean
 
 
 def _register(profile: Profile, name: str, data: bytes, start: int) -> int:

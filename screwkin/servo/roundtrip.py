@@ -22,6 +22,7 @@ _LEAST = 0.008  # s: a computer that does something else for a moment is no serv
 _MARGIN = 0.004  # s
 _FACTOR = 1.5  # of what 99 % of the answers take
 _SLOW = 0.004  # s: more than a servo and its bytes take at any usual rate
+_FAILED = 2  # answers that may be missing among those that are measured
 _USB_SERIAL = Path("/sys/bus/usb-serial/devices")
 
 
@@ -62,8 +63,8 @@ def round_trip(bus: Bus) -> RoundTrip | None:
     return RoundTrip(float(least), float(median), float(most), len(times))
 
 
-def measured(bus: Bus, ids: Sequence[int], address: int, length: int) -> RoundTrip | None:
-    """The round trips of a bus, of as many answers as it takes; None if no servo answers.
+def measured(bus: Bus, ids: Sequence[int], address: int, length: int) -> RoundTrip:
+    """The round trips of a bus, of the recent answers and as many more as it takes.
 
     Args:
         bus: with the servos.
@@ -72,17 +73,22 @@ def measured(bus: Bus, ids: Sequence[int], address: int, length: int) -> RoundTr
         length: number of bytes.
 
     Raises:
-        LineLostError: the port is gone.
+        BusError: servos do not answer. LineLostError: the port is gone.
     """
-    bus.statistics.recent.clear()
-    for k in range(SAMPLES if ids else 0):
+    failed = 0
+    for k in range(SAMPLES - len(bus.statistics.recent)):
         try:
             bus.read(ids[k % len(ids)], address, length)
         except LineLostError:
             raise
         except BusError:
-            continue
-    return round_trip(bus)
+            failed += 1
+            if failed > _FAILED:
+                raise
+    trip = round_trip(bus)
+    if trip is None:
+        raise BusError("no servo answers")
+    return trip
 
 
 def latency_timer(port: str) -> int | None:

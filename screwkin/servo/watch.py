@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 import numpy as np
 
+from screwkin.algebra.arrays import Array
 from screwkin.servo.gate import Bounds
 from screwkin.servo.line import ErrorBit
 
@@ -20,6 +22,7 @@ FaultKind = Literal[
     "torque",
     "servo",
     "lost",
+    "unseen",
     "line",
     "late",
     "gate",
@@ -59,13 +62,15 @@ class PlayStopped(Exception):
 class Thresholds:
     """When a play is stopped.
 
-    tracking [rad] for tracking_time [s]; temperature [degrees Celsius]; voltage as shares of the servo's
-    nominal one; load [share of the greatest torque] for load_time [s]; lost: replies of one servo missing
-    in a row; silence: replies missing in a row, of any; late [s]: of a frame.
+    tracking [rad] from every goal of the last tracking_time [s]; temperature [degrees Celsius]; voltage as
+    shares of the servo's nominal one; load [share of the greatest torque] for load_time [s]; lost: replies of
+    one servo missing in a row; silence: replies missing in a row, of any; late [s]: of a frame; notice [s]:
+    within which a blocked joint must be noticed; no servo may go unread for longer; reopen [s]: for which a
+    lost port is tried again.
     """
 
-    tracking: float = 0.4
-    tracking_time: float = 0.2
+    tracking: float = 0.25
+    tracking_time: float = 0.1
     temperature: float = 65.0
     voltage_low: float = 0.75
     voltage_high: float = 1.25
@@ -74,6 +79,16 @@ class Thresholds:
     lost: int = 5
     silence: int = 6
     late: float = 0.2
+    notice: float = 0.5
+    reopen: float = 2.0
+
+    @property
+    def interval(self) -> float:
+        """The longest time planned from one reading of a servo to the next [s].
+
+        A blocked joint may be near its goals at one reading, by chance, but hardly at two.
+        """
+        return self.notice / 2
 
 
 class Watch:
@@ -83,7 +98,8 @@ class Watch:
         n = len(bounds.ids)
         self.bounds, self.thresholds = bounds, thresholds
         self.max_tracking_error = 0.0
-        self._off_since = np.full(n, math.nan)
+        self._goals: deque[tuple[float, Array]] = deque()
+        self._seen = np.full(n, math.nan)
         self._loaded_since = np.full(n, math.nan)
         self._lost, self._silence = np.zeros(n, dtype=int), 0
         self.torque_limits: np.ndarray[Any, Any] | None = None
@@ -94,7 +110,7 @@ class Watch:
         Raises:
             PlayStopped: it complains, or is too hot, or its voltage is out of range.
         """
-        self._lost[k], self._silence = 0, 0
+        self._lost[k], self._silence, self._seen[k] = 0, 0, time
         limit, nominal = self.thresholds, self.bounds.profiles[k].voltage
         if errors & _HEALTH:
             self._fault("servo", k, time, f"it reports {', '.join(sorted(errors & _HEALTH))}")
@@ -107,16 +123,19 @@ class Watch:
             self._fault("voltage", k, time, f"{values['voltage']:.1f} V, outside {low:.1f} to {high:.1f} V")
 
     def tracked(self, k: int, values: Mapping[str, float], command: float, time: float) -> None:
-        """A servo that follows commands has answered.
+        """A servo that follows commands has answered. One reading is enough: the next may be long in coming.
 
         Raises:
-            PlayStopped: it is too far off, or loaded too much, for too long; or its torque was changed.
+            PlayStopped: it is too far off, or loaded too much for too long; or its torque was changed.
         """
         limit = self.thresholds
         error = abs(values["position"] - command)
         self.max_tracking_error = max(self.max_tracking_error, error)
-        if self._for_long(self._off_since, k, error > limit.tracking, time, limit.tracking_time):
-            self._fault("tracking", k, time, f"{error:.3f} rad off its goal, at most {limit.tracking:.3f}")
+        while len(self._goals) > 1 and self._goals[1][0] <= time - limit.tracking_time:
+            self._goals.popleft()
+        off = min([error, *(abs(values["position"] - float(goal[k])) for _, goal in self._goals)])
+        if off > limit.tracking:
+            self._fault("tracking", k, time, f"{off:.3f} rad off its goal, at most {limit.tracking:.3f}")
         load = abs(values["load"])
         if self._for_long(self._loaded_since, k, load > limit.load, time, limit.load_time):
             self._fault(
@@ -147,12 +166,18 @@ class Watch:
         if self._lost[k] >= self.thresholds.lost:
             self._fault("lost", k, time, f"{self._lost[k]} replies in a row are missing")
 
-    def late(self, by: float, time: float) -> None:
-        """A frame was sent late.
+    def frame(self, goal: Array, by: float, time: float) -> None:
+        """Goals (n,) [rad] were sent, late by so much [s].
 
         Raises:
-            PlayStopped: by too much.
+            PlayStopped: by too much; or a servo has not been read for too long.
         """
+        self._goals.append((time, goal))
+        self._seen[np.isnan(self._seen)] = time
+        k = int(self._seen.argmin())
+        if (unseen := time - self._seen[k]) > self.thresholds.notice:
+            text = f"it has not been read for {unseen:.2f} s, at most {self.thresholds.notice:.2f}"
+            self._fault("unseen", k, time, text)
         if by > self.thresholds.late:
             text = f"a frame was sent {by:.3f} s late, at most {self.thresholds.late:.3f}"
             raise PlayStopped(ServoFault("late", "", -1, time, text))

@@ -12,7 +12,7 @@ import errno
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from heapq import heappop, heappush
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 
@@ -157,6 +157,16 @@ class VirtualBus:
         self._arrive()
         self._arrived.clear()
 
+    def reopened(self) -> Self:
+        """The port, opened anew.
+
+        Raises:
+            OSError: the cable is pulled.
+        """
+        self._coming.clear()
+        self._arrive()
+        return self
+
     def close(self) -> None:
         """Give the port back; the servos stay as they are."""
 
@@ -258,7 +268,7 @@ class VirtualBus:
         while self._turns and self._turns[0][0] <= time:
             at, begins, fault = self._turns.pop(0)
             if fault.kind == "pulled":
-                self.pulled = True
+                self.pulled = begins
             if fault.kind not in _SERVOS_OWN:
                 continue
             for servo in self.servos:

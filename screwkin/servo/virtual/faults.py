@@ -38,7 +38,7 @@ class InjectedFault:
     ``deaf``: commands do not reach the servo. ``dropped``, ``corrupted``, ``truncated``, ``late`` (0.2 s),
     ``noise`` (bytes before it): of answers. ``reset``: the servo starts anew. ``overload``: twice the stall
     torque on it. ``overheat``: 10 degrees above its limit. ``brown-out``: ``volts`` for it. ``pulled``: the
-    port is gone for good. ``id`` is the servo concerned, None all; ``share`` is how many of the answers or
+    port is gone. ``id`` is the servo concerned, None all; ``share`` is how many of the answers or
     commands concerned are affected.
     """
 
