@@ -12,7 +12,8 @@ from contextlib import suppress
 from functools import partial
 from typing import Any, Literal
 
-from screwkin.errors import InputError, ScrewkinError, needed_for
+from screwkin.errors import InputError, needed_for
+from screwkin.servo.driver import DriverPort
 from screwkin.servo.line import (
     BROADCAST,
     REFUSED,
@@ -31,8 +32,6 @@ from screwkin.servo.line import (
 from screwkin.servo.packets import Instruction, Packet, ProtocolName
 from screwkin.servo.protocols import codec
 
-_MOST_NOISE = 4096  # bytes of one reply that are waited through before a babbling line counts as silent
-_BITS_PER_BYTE = 10  # a start bit, eight data bits and a stop bit
 _MOST_STRANGERS = 8  # sound packets of other servos that are passed over
 
 _REOPENING = 0.05  # s, from one try to open a lost port to the next
@@ -41,52 +40,6 @@ PATIENCE = 0.050
 
 Grouped = Literal["none", "sync", "bulk"]
 """One packet that several servos answer in turn: sync read of protocol 2.0, bulk read of MX servos on 1.0."""
-
-
-class _Port:
-    """What the driver takes for its port: a line and a clock."""
-
-    def __init__(self, line: ByteLine, clock: Clock, baud: int, patience: float) -> None:
-        self.line, self.clock, self.baud, self.patience = line, clock, baud, patience
-        self.is_open, self.is_using = True, False
-        self.deadline, self.taken = clock.now(), 0
-
-    def getBaudRate(self) -> int:
-        return self.baud
-
-    def clearPort(self) -> None:
-        self._guarded(self.line.reset_input_buffer)
-
-    def writePort(self, packet: Sequence[int]) -> int:
-        sent = self._guarded(lambda: self.line.write(bytes(packet)))
-        return len(packet) if sent is None else int(sent)
-
-    def readPort(self, length: int) -> bytes:
-        if self.taken >= _MOST_NOISE:
-            return b""
-        data = bytes(self._guarded(lambda: self.line.read(max(0, length))))
-        self.taken += len(data)
-        if not data and length > 0:
-            self.clock.sleep(1e-4)
-        return data
-
-    def setPacketTimeout(self, packet_length: int) -> None:
-        self.setPacketTimeoutMillis(1e3 * (packet_length * _BITS_PER_BYTE / self.baud + self.patience))
-
-    def setPacketTimeoutMillis(self, msec: float) -> None:
-        self.deadline, self.taken = self.clock.now() + 1e-3 * msec, 0
-
-    def isPacketTimeout(self) -> bool:
-        return self.clock.now() > self.deadline or self.taken >= _MOST_NOISE
-
-    def _guarded(self, act: Callable[[], Any]) -> Any:
-        """A line that fails is lost; pulled ports raise OSError, TypeError, or termios.error (neither)."""
-        try:
-            return act()
-        except ScrewkinError:
-            raise
-        except Exception as error:
-            raise LineLostError(f"the port is gone ({error}): check the cable") from None
 
 
 class Bus:
@@ -121,7 +74,7 @@ class Bus:
         self.clock: Clock = clock or MonotonicClock()
         self.statistics = Statistics()
         self._sdk = sdk
-        self._port = _Port(line, self.clock, baud, patience)
+        self._port = DriverPort(line, self.clock, baud, patience)
         self._codec = codec(protocol)
         self._facts = self._codec.FACTS
         self._handler = sdk.PacketHandler(self._facts.driver)
