@@ -70,6 +70,15 @@ def grouping(profiles: Sequence[Profile]) -> Grouped:
     return "bulk" if profiles[0].has_bulk_read else "none"
 
 
+def _goal_rows(profile: Profile) -> tuple[int, ...]:
+    """Bytes of a servo in each sync write of goals: one if position and speed lie side by side, else two."""
+    first, last = sorted(
+        (profile.register(name) for name in ("goal_position", "moving_speed")), key=lambda r: r.address
+    )
+    together = first.end == last.address
+    return (first.width + last.width,) if together else (first.width, last.width)
+
+
 def budget(
     profiles: tuple[Profile, ...],
     baud: int,
@@ -90,11 +99,11 @@ def budget(
     """
     byte = _BITS / baud
     facts = codec(profiles[0].protocol).FACTS
-    goals = sum(
-        1 + profile.register("goal_position").width + profile.register("moving_speed").width
-        for profile in profiles
+    rows = [_goal_rows(profile) for profile in profiles]
+    goals = sum(len(row) + sum(row) for row in rows)  # an id before each
+    packets = sum(
+        len(row) for row in {profile.model: row for profile, row in zip(profiles, rows, strict=True)}.values()
     )
-    packets = len({profile.model for profile in profiles})
     longest = max(block_of(profile)[1] for profile in profiles)
     more = (facts.answer_size + longest) * byte + return_delay  # an answer that follows another
     read = facts.read_size * byte + more + adapter if answer is None else answer

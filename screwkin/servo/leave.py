@@ -9,6 +9,7 @@ from typing import Literal
 from screwkin.servo.bus import Bus
 from screwkin.servo.gate import Gate
 from screwkin.servo.line import BusError, LineLostError
+from screwkin.servo.profiles import decode
 
 EndState = Literal["hold", "limp"]
 """How servos can be left: stiff where they are, or without torque."""
@@ -113,7 +114,7 @@ class _Reader:
         """
         register = self.gate.bounds.profiles[k].register(name)
         try:
-            value = self.bus.read(self.gate.bounds.ids[k], register.address, register.width).value
+            raw = self.bus.read(self.gate.bounds.ids[k], register.address, register.width).value
         except LineLostError:
             raise
         except BusError as error:
@@ -122,4 +123,4 @@ class _Reader:
                 raise LineLostError("no servo answers any more: check the cable") from error
             return None
         self.silent = 0
-        return value
+        return decode(register, raw)

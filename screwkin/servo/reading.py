@@ -11,7 +11,7 @@ from screwkin.servo.budget import block_of, budget, grouping
 from screwkin.servo.bus import Bus, Grouped
 from screwkin.servo.gate import Bounds
 from screwkin.servo.line import BusError, LineLostError, Reply
-from screwkin.servo.profiles import Profile, physical
+from screwkin.servo.profiles import Profile, decode, physical
 from screwkin.servo.roundtrip import latency_advice, measured
 
 Taken = Callable[[int, Reply], None]
@@ -51,7 +51,8 @@ class Readings:
             for name, number in raw.items()
             if name.startswith("present_")
         }
-        values["position"] = self.bounds.radians_of(k, raw["present_position"])
+        position = decode(profile.register("present_position"), raw["present_position"])
+        values["position"] = self.bounds.radians_of(k, position)
         values["speed"] *= math.copysign(1.0, self.bounds.scale[k])
         values |= {name: float(raw[name]) for name in ("torque_enable", "torque_limit") if name in raw}
         return values
