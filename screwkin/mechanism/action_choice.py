@@ -26,7 +26,7 @@ from screwkin.mechanism.choice import independent, rank
 from screwkin.mechanism.mechanism import Mechanism, unchosen
 from screwkin.mechanism.network import coupling_screws
 from screwkin.mechanism.scaling import centre, characteristic_length
-from screwkin.mechanism.screw_text import wrench_text
+from screwkin.mechanism.screw_text import wrench_screw
 from screwkin.model.robot import Robot
 from screwkin.model.state import State, reference_posture
 
@@ -183,7 +183,8 @@ def _meanings(mechanism: Mechanism, system: ActionSystem, actions: Sequence[int]
     state = State(np.eye(4), np.array(reference_posture(mechanism.robot), dtype=float))
     W = unit_wrenches(mechanism, system, state)
     term = {a: t for t, (a, _, _) in reversed(list(enumerate(system.terms)))}
-    return [wrench_text(W[:, term[a]]) for a in actions]
+    size = characteristic_length(mechanism.robot)
+    return [wrench_screw(W[:, term[a]], np.zeros(3), size).text for a in actions]
 
 
 def _check(chosen: ActionChoice, A: Array, wanted: Names) -> None:

@@ -16,10 +16,13 @@ from screwkin.algebra.arrays import Array
 from screwkin.compiler.run import common_batch
 from screwkin.errors import SingularError
 from screwkin.kinematics.status import Status
+from screwkin.mechanism.free_screws import FreeScrews, free_screws
 from screwkin.mechanism.least_values import least_values, network_values
 from screwkin.mechanism.mechanism import Mechanism
+from screwkin.mechanism.network import coupling_screws
 from screwkin.mechanism.rates import block_name, block_rows, flat, network_of
 from screwkin.mechanism.scaling import centre, referenced
+from screwkin.model.display import listing
 from screwkin.model.state import State
 
 NEAR = 0.02
@@ -31,7 +34,10 @@ TOLERANCE = 0.05
 
 @dataclass(frozen=True)
 class LimbSingularity:
-    """The worst sample of a limb (or loop): its smallest singular value, and the cause when it is small."""
+    """The worst sample of a limb (or loop): its smallest singular value, and the cause when it is small.
+
+    Where it is near, and a state was given, ``free`` holds the motion and the wrench that it leaves free.
+    """
 
     limb: str
     sample: int
@@ -39,6 +45,7 @@ class LimbSingularity:
     near: bool
     joints: tuple[str, ...]
     cause: str
+    free: FreeScrews | None = None
 
 
 def singularity_report(mechanism: Mechanism, at: State | Array) -> tuple[LimbSingularity, ...]:
@@ -65,20 +72,24 @@ def singularity_report(mechanism: Mechanism, at: State | Array) -> tuple[LimbSin
         T, q = flat(T, 2, batch), flat(q, 1, batch)
         sigma = least_values(mechanism, T, q)
         worst = sigma.argmin(axis=0)
-        N = network_of(mechanism, T[worst], q[worst])
+        N, S = network_of(mechanism, T[worst], q[worst]), coupling_screws(mechanism, State(T[worst], q[worst]))
     else:
         every = np.reshape(at, (-1, *np.shape(at)[-2:]))
         sigma = network_values(mechanism, every)
         worst = sigma.argmin(axis=0)
-        N = every[worst]
-    scaled = referenced(mechanism, N)
-    return tuple(
-        _entry(mechanism, k, int(sample), float(sigma[sample, k]), scaled[k])
-        for k, sample in enumerate(worst)
-    )
+        N, S = every[worst], None
+    scaled, entries = referenced(mechanism, N), []
+    for k, sample in enumerate(worst):
+        smallest, free = float(sigma[sample, k]), None
+        if S is not None and smallest < NEAR:
+            free = free_screws(mechanism, k, N[k], S[k], NEAR)
+        entries.append(_entry(mechanism, k, int(sample), smallest, scaled[k], free))
+    return tuple(entries)
 
 
-def _entry(mechanism: Mechanism, block: int, sample: int, sigma: float, scaled: Array) -> LimbSingularity:
+def _entry(
+    mechanism: Mechanism, block: int, sample: int, sigma: float, scaled: Array, free: FreeScrews | None
+) -> LimbSingularity:
     """The entry of one block, from its referenced network matrix at its worst sample."""
     circuits, inside = mechanism.blocks[block]
     chosen = [mechanism.secondary_columns[i] for i in inside]
@@ -86,9 +97,9 @@ def _entry(mechanism: Mechanism, block: int, sample: int, sigma: float, scaled: 
     dependent = [k for k in range(len(chosen)) if abs(null[k]) > 0.05 * np.abs(null).max()]
     names = [mechanism.couplings[c] for c in chosen]
     near = sigma < NEAR
-    cause = _cause(names, _screws(scaled, mechanism, chosen), dependent) if near else ""
+    cause = _cause(names, _screws(scaled, mechanism, chosen), dependent, free) if near else ""
     joints = tuple(names[k] for k in dependent)
-    return LimbSingularity(block_name(mechanism, circuits), sample, sigma, near, joints, cause)
+    return LimbSingularity(block_name(mechanism, circuits), sample, sigma, near, joints, cause, free)
 
 
 def refuse_singular(
@@ -123,7 +134,7 @@ def _screws(N: Array, mechanism: Mechanism, columns: Sequence[int]) -> Array:
     return np.array([N[6 * r : 6 * r + 6, c] for r, c in zip(rows, columns, strict=True)])
 
 
-def _cause(names: Sequence[str], screws: Array, taking: Sequence[int]) -> str:
+def _cause(names: Sequence[str], screws: Array, taking: Sequence[int], free: FreeScrews | None) -> str:
     """What is special about the dependent screws of a block, in words; ``taking`` are the dependent ones."""
     dependent, chosen = screws[list(taking)], [names[k] for k in taking]
     listed = ", ".join(chosen)
@@ -149,7 +160,13 @@ def _cause(names: Sequence[str], screws: Array, taking: Sequence[int]) -> str:
                 return (
                     f"{here} and {there} can both turn about the line through the two points where they meet"
                 )
-    return f"the screws of {listed} are dependent: a wrench exists that does no work on any of them"
+    if free is None:
+        names = listing(chosen)
+        return f"the screws of {names} are dependent: a wrench exists that does no work on any of them"
+    return (
+        f"{free.body} can move while the primary couplings rest, by {free.motion.text}; "
+        f"free wrench: {free.wrench.text}"
+    )
 
 
 def _concurrent(names: Sequence[str], taking: Sequence[int]) -> str:
