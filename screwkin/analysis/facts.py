@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from screwkin.algebra.se3 import IDENTITY, ZERO, Vector
-from screwkin.mechanism.choice import closed_mechanism, mobility_at
+from screwkin.errors import UnreachableError, one_of
+from screwkin.mechanism.choice import CLOSED, closed_mechanism, mobility_at
+from screwkin.mechanism.closure import close_loops
 from screwkin.mechanism.mechanism import Mechanism
 from screwkin.mechanism.network import coupling_twists, network_of_twists
 from screwkin.mechanism.singularity import LimbSingularity, singularity_report
 from screwkin.model.coupled import coupling_of
 from screwkin.model.robot import Robot
-from screwkin.model.state import reference_posture
+from screwkin.model.state import State, reference_posture
+
+STEPS = 12
+"""In which a mechanism goes to imposed coordinates, so that it stays on its branch."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,6 +33,8 @@ class Facts:
     rank: int
     condition: float
     """cond(N_s), N_s being the secondary columns of N; NaN for a robot without circuits."""
+    state: State
+    """Where the singular values are taken, the base at the world's origin."""
     limbs: tuple[LimbSingularity, ...]
 
     @property
@@ -72,6 +79,8 @@ def facts_of(
     posture: str | None = None,
     place: Sequence[float] = (0.0, 0.0, 0.0),
     point: Sequence[float] | None = None,
+    primary: Sequence[str] | None = None,
+    imposed: Mapping[str, float] | None = None,
 ) -> Facts:
     """The facts of a robot in a posture.
 
@@ -80,16 +89,21 @@ def facts_of(
         posture: its name; default ``home``, else the first one, else all joints at zero.
         place: where its base stands in the world [m].
         point: world point [m] at which N is formed; default: the base origin, which travels with the robot.
+        primary: names of the couplings to impose; default: those of ``closed_mechanism``.
+        imposed: coordinates [rad or m] to which couplings that are primary by default go from the posture.
 
     Raises:
-        UnknownNameError: no such posture.
+        UnknownNameError: no such posture or coupling. UnreachableError: the loops do not close there.
     """
-    mechanism = closed_mechanism(robot)
+    mechanism = closed_mechanism(robot, primary)
     q = list(reference_posture(robot) if posture is None else robot.posture(posture).q)
+    if imposed:
+        q = _moved(robot, q, imposed)
     about = ZERO if point is None else Vector(*point) - Vector(*place)
     at_waist, N = (
         network_of_twists(mechanism, coupling_twists(mechanism, IDENTITY, q, p)) for p in (ZERO, about)
     )
+    state = State(np.eye(4), np.array(q, dtype=float))
     driven = set(mechanism.primary) if robot.closures else set(robot.joint_names)
     mobility = int(mobility_at(mechanism, at_waist)) if len(N) else len(mechanism.couplings)
     return Facts(
@@ -98,8 +112,27 @@ def facts_of(
         actuated_joints=tuple(name for name in robot.joint_names if name in driven),
         rank=len(mechanism.couplings) - mobility,
         condition=_condition(N[:, mechanism.secondary_columns]),
-        limbs=singularity_report(mechanism, at_waist) if mechanism.secondary else (),
+        state=state,
+        limbs=singularity_report(mechanism, state) if mechanism.secondary else (),
     )
+
+
+def _moved(robot: Robot, q: Sequence[float], imposed: Mapping[str, float]) -> list[float]:
+    """The posture to which couplings have gone from another one, in steps along which loops close."""
+    mechanism = closed_mechanism(robot)
+    state = State(np.eye(4), np.array(q, dtype=float))
+    start = dict(zip(mechanism.couplings, close_loops(mechanism, state, {}).coordinates, strict=True))
+    for share in np.linspace(0, 1, STEPS + 1)[1:]:
+        here = {
+            name: (1 - share) * start[one_of("coupling", name, mechanism.couplings)] + share * x
+            for name, x in imposed.items()
+        }
+        solution = close_loops(mechanism, state, here)
+        if solution.residual > CLOSED:
+            told = ", ".join(f"{name} = {x:.6g}" for name, x in here.items())
+            raise UnreachableError(f"{robot.name}: the loops do not close at {told}; impose less")
+        state = solution.state
+    return [float(x) for x in state.q]
 
 
 def _condition(Ns: Any) -> float:

@@ -11,7 +11,7 @@ import typer
 
 from screwkin.algebra.arrays import Array
 from screwkin.cli.forces_along import FRICTION, VALIDATED, Wanted, forces_along
-from screwkin.cli.options import AsJson, OutputFolder, numbers_of
+from screwkin.cli.options import AsJson, OutputFolder, assignment, assignments, numbers_of
 from screwkin.cli.output import aligned, print_json
 from screwkin.errors import InputError
 from screwkin.mechanism.action_choice import ActionChoice, action_choice
@@ -112,7 +112,7 @@ def _statics(
     as_json: bool,
 ) -> int:
     """Equilibrium of a robot in a posture."""
-    loads, imposed = _loads(load), _imposed(impose)
+    loads, imposed = _loads(load), assignments("--impose", impose, "object.fy=-5")
     if not (loads or imposed or weights):
         raise InputError("nothing loads it; add --load NAME=VALUES, --impose ACTION=VALUE or --weights")
     mechanism = closed_mechanism(robot)
@@ -135,7 +135,7 @@ def _loads(texts: Sequence[str]) -> dict[str, Any]:
     """Loads by name: an effort, a force, or a wrench about the world's origin."""
     loads: dict[str, Any] = {}
     for text in texts:
-        name, values = _assignment("--load", text, "rocker=10")
+        name, values = assignment("--load", text, "rocker=10")
         before, _, place = values.partition("@")
         numbers = numbers_of(before, f"--load {name}", (1, 3, 6))
         value: Any = numbers[0] if len(numbers) == 1 else np.array(numbers)
@@ -149,23 +149,6 @@ def _loads(texts: Sequence[str]) -> dict[str, Any]:
             raise InputError(f"--load {name} is given twice; add the two up")
         loads[name] = value
     return loads
-
-
-def _imposed(texts: Sequence[str]) -> dict[str, float]:
-    imposed: dict[str, float] = {}
-    for text in texts:
-        name, value = _assignment("--impose", text, "object.fy=-5")
-        if name in imposed:
-            raise InputError(f"--impose {name} is given twice; once is enough")
-        (imposed[name],) = numbers_of(value, f"--impose {name}", (1,))
-    return imposed
-
-
-def _assignment(option: str, text: str, example: str) -> tuple[str, str]:
-    name, equals, value = (part.strip() for part in text.partition("="))
-    if not (equals and name and value):
-        raise InputError(f"{option} {text!r} is no assignment; write {option} {example}")
-    return name, value
 
 
 def _turned(state: State, down: str | None) -> State:

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from screwkin.analysis.facts import Facts, facts_of
 from screwkin.analysis.ik_class import IkClass, ik_classes
-from screwkin.cli.options import AsJson, RobotName, point_of
-from screwkin.cli.output import aligned, print_json
+from screwkin.cli.folder import output_folder
+from screwkin.cli.options import AsJson, RobotName, assignments, point_of
+from screwkin.cli.output import aligned, drawn, print_json, remark
 from screwkin.compiler.run import large_batches
 from screwkin.errors import MissingDependencyError
+from screwkin.mechanism.singularity import LimbSingularity
 from screwkin.model.coupled import coupling_text
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
+from screwkin.report.singular import save_singularities
 from screwkin.sim.self_collision import touching_at_home
 
 
@@ -28,12 +32,36 @@ def info(
         str | None,
         typer.Option(metavar="X,Y,Z", help="World point where N is formed [m]; default: the waist."),
     ] = None,
+    primary: Annotated[
+        list[str] | None,
+        typer.Option(help="A coupling to impose; repeat for all of them."),
+    ] = None,
+    move: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="COUPLING=VALUE",
+            help="Go there with closed loops [rad or m]; may be repeated.",
+        ),
+    ] = None,
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="DIR", help="Folder for pictures of what is singular."),
+    ] = None,
     as_json: AsJson = False,
 ) -> int:
     """Mass, closed mechanism (couplings, circuits, mobility, network matrix) and conditioning of a robot."""
     facts = facts_of(
-        load_robot(robot), posture, point_of(at, "--at") or (0.0, 0.0, 0.0), point_of(point, "--point")
+        load_robot(robot),
+        posture,
+        point_of(at, "--at") or (0.0, 0.0, 0.0),
+        point_of(point, "--point"),
+        primary,
+        assignments("--move", move or [], "crank=0.5"),
     )
+    if output is not None:
+        with output_folder(output, "info", facts.robot.name) as folder:
+            for path in drawn(lambda: save_singularities(facts.robot, facts.state, facts.limbs, folder)):
+                remark(f"wrote {path}")
     if as_json:
         touching = _touching(facts.robot)
         solved = [limb.to_dict() for limb in ik_classes(facts.robot)]
@@ -88,10 +116,7 @@ def _text(facts: Facts) -> str:
             ],
         ),
     ]
-    limbs = [
-        (limb.limb, f"{limb.sigma:.4f}", f"NEAR A SINGULARITY: {limb.cause}" if limb.near else "regular")
-        for limb in facts.limbs
-    ]
+    limbs = [row for limb in facts.limbs for row in _singular(limb)]
     parts = [
         f"{robot.name}: {robot.description}",
         aligned(body, "  "),
@@ -104,6 +129,16 @@ def _text(facts: Facts) -> str:
     if limbs:
         parts += ["smallest singular value, dimensionless by the robot's size", aligned(limbs, "  ")]
     return "\n".join(parts)
+
+
+def _singular(limb: LimbSingularity) -> list[tuple[str, ...]]:
+    """How near a limb or loop is to a singularity; why, and what it leaves free."""
+    state = f"NEAR A SINGULARITY: {limb.cause}" if limb.near else "regular"
+    rows: list[tuple[str, ...]] = [(limb.limb, f"{limb.sigma:.4f}", state)]
+    if limb.free is not None and limb.free.motion.text not in limb.cause:
+        rows.append(("", "", f"free motion of {limb.free.body}: {limb.free.motion.text}"))
+        rows.append(("", "", f"free wrench: {limb.free.wrench.text}"))
+    return rows
 
 
 def _solved(limb: IkClass) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -81,4 +82,31 @@ def numbers_of(
         raise InputError(f"{option} {text!r} is no {what}; write {write}")
     if not all(map(math.isfinite, values)):
         raise InputError(f"{option} {text!r} holds NaN or infinity; write {write}")
+    return values
+
+
+def assignment(option: str, text: str, example: str) -> tuple[str, str]:
+    """Name and value of ``NAME=VALUE``.
+
+    Raises:
+        InputError: the text is no assignment.
+    """
+    name, equals, value = (part.strip() for part in text.partition("="))
+    if not (equals and name and value):
+        raise InputError(f"{option} {text!r} is no assignment; write {option} {example}")
+    return name, value
+
+
+def assignments(option: str, texts: Sequence[str], example: str) -> dict[str, float]:
+    """Numbers by name, of ``NAME=NUMBER`` texts.
+
+    Raises:
+        InputError: a text is no assignment of a finite number, or a name is given twice.
+    """
+    values: dict[str, float] = {}
+    for text in texts:
+        name, value = assignment(option, text, example)
+        if name in values:
+            raise InputError(f"{option} {name} is given twice; once is enough")
+        (values[name],) = numbers_of(value, f"{option} {name}", (1,), "number", "one number")
     return values

@@ -15,10 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.mechanism.mechanism import FLOOR, Mechanism
+from screwkin.mechanism.mechanism import Mechanism, welded_links
 from screwkin.mechanism.rates import block_rows
 from screwkin.mechanism.scaling import centre, characteristic_length
 from screwkin.mechanism.screw_text import ScrewLine, twist_screw, wrench_screw
+from screwkin.mechanism.virtual_chain import FLOOR
 
 ALONE = 0.05
 """Share of the largest circuit's wrench below which another circuit takes no part."""
@@ -96,18 +97,25 @@ def _moving_body(
     mechanism: Mechanism, twists: dict[str, Array], middle: Array, size: float
 ) -> tuple[str, Array]:
     """The link that moves, and how: of links with most couplings, the one that moves most."""
-    speeds = {}
-    for name in mechanism.robot.link_names:
-        if name in twists:
-            omega, v = twists[name][:3], twists[name][3:] + np.cross(twists[name][:3], middle)
-            speeds[name] = float(np.hypot(np.linalg.norm(omega), np.linalg.norm(v) / size))
-    degree = dict.fromkeys(mechanism.links, 0)
-    for _, *ends in mechanism.graph.edges:
-        for end in ends:
-            degree[end] += 1
+    robot = mechanism.robot
+    vertex = welded_links(robot, robot.closures)
+    named = [joint.parent for joint in robot.tree] + [joint.child for joint in robot.tree]
+    named += [link for c in robot.closures for link in (c.link_a, c.link_b)]
+    named += [limb.link for limb in robot.limbs]
+    speeds, degree = {}, {}
+    for name in robot.link_names:
+        if vertex[name] in twists:
+            omega, v = np.split(twists[vertex[name]], 2)
+            both = np.concatenate([omega, (v + np.cross(omega, middle)) / size])
+            speeds[name] = round(float(np.linalg.norm(both)), 9)  # equal of links that are one
+            degree[name] = sum(vertex[name] in ends for _, *ends in mechanism.graph.edges)
     fastest = max(speeds.values())
-    body = max(speeds, key=lambda name: (speeds[name] > MOVING * fastest, degree[name], speeds[name]))
-    return body, twists[body]
+
+    def rank(name: str) -> tuple[bool, int, float, int]:
+        return speeds[name] > MOVING * fastest, degree[name], speeds[name], named.count(name)
+
+    body = max(speeds, key=rank)
+    return body, twists[vertex[body]]
 
 
 def _free_wrench(

@@ -72,7 +72,10 @@ def singularity_report(mechanism: Mechanism, at: State | Array) -> tuple[LimbSin
         T, q = flat(T, 2, batch), flat(q, 1, batch)
         sigma = least_values(mechanism, T, q)
         worst = sigma.argmin(axis=0)
-        N, S = network_of(mechanism, T[worst], q[worst]), coupling_screws(mechanism, State(T[worst], q[worst]))
+        N, S = (
+            network_of(mechanism, T[worst], q[worst]),
+            coupling_screws(mechanism, State(T[worst], q[worst])),
+        )
     else:
         every = np.reshape(at, (-1, *np.shape(at)[-2:]))
         sigma = network_values(mechanism, every)

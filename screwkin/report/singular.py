@@ -1,4 +1,4 @@
-"""A singular posture drawn: the links, the screw by which one moves freely, and the wrench that finds no hold."""
+"""A singular posture drawn: its links, the screw by which one moves freely, and the free wrench."""
 
 from __future__ import annotations
 
@@ -52,22 +52,20 @@ def singular_figure(robot: Robot, state: State, entry: LimbSingularity) -> Figur
     every = np.concatenate([np.array(points) for points in ends.values() if points])
     size = float(np.ptp(every, axis=0).max()) or 1.0
     if entry.free is not None:
-        _line(axes, entry.free.wrench, base, size, WRENCH, "--", f"free wrench: {entry.free.wrench.text}")
-        _line(axes, entry.free.motion, base, size, MOTION, "-", _moves(entry))
-        _helix(axes, entry.free.motion, base, size)
+        motion, wrench = entry.free.motion, entry.free.wrench
+        _line(axes, wrench, base, 0.75 * size, WRENCH, f"free wrench: {wrench.text}")
+        _line(axes, motion, base, 0.55 * size, MOTION, f"{shown(entry.free.body)} moves: {motion.text}")
+        _helix(axes, motion, base, size)
     middle = (every.max(axis=0) + every.min(axis=0)) / 2
     for k, set_limits in enumerate((axes.set_xlim, axes.set_ylim, axes.set_zlim)):
         set_limits(middle[k] - 0.6 * size, middle[k] + 0.6 * size)
     axes.set_box_aspect((1, 1, 1))
     axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]")
-    figure.suptitle(f"{robot.name}, {shown(entry.limb)[:60]}: smallest singular value {entry.sigma:.2g}", y=0.985)
+    figure.suptitle(
+        f"{robot.name}, {shown(entry.limb)[:60]}: smallest singular value {entry.sigma:.2g}", y=0.985
+    )
     figure.legend(loc="upper center", bbox_to_anchor=(0.5, 0.955), ncols=1)
     return figure
-
-
-def _moves(entry: LimbSingularity) -> str:
-    assert entry.free is not None
-    return f"{shown(entry.free.body)} moves: {entry.free.motion.text}"
 
 
 def _ends(robot: Robot, state: State) -> dict[str, list[Array]]:
@@ -88,7 +86,8 @@ def _ends(robot: Robot, state: State) -> dict[str, list[Array]]:
                 pose = poses[robot.link_names.index(name)]
                 ends[name].append(pose[:3, :3] @ np.array(as_array(own.p), dtype=float) + pose[:3, 3])
     for limb in robot.limbs:
-        ends[limb.link].append(np.asarray(frame_pose(robot, state, limb.tip))[:3, 3])
+        if len(ends[limb.link]) < 2:
+            ends[limb.link].append(np.asarray(frame_pose(robot, state, limb.tip))[:3, 3])
     return ends
 
 
@@ -99,11 +98,13 @@ def _strokes(points: Sequence[Array]) -> list[tuple[Array, Array]]:
     )
 
 
-def _line(axes: Axes, screw: ScrewLine, base: Array, size: float, colour: str, style: str, label: str) -> None:
+def _line(axes: Axes, screw: ScrewLine, base: Array, reach: float, colour: str, label: str) -> None:
     """The axis of a screw, through its point."""
     point, axis = base[:3, 3] + np.array(screw.point), np.array(screw.axis)
-    a, b = point - 0.6 * size * axis, point + 0.6 * size * axis
-    axes.plot(*zip(a, b, strict=True), color=colour, ls=style, lw=1.8, label=label)
+    a, b = point - reach * axis, point + reach * axis
+    axes.plot(
+        *zip(a, b, strict=True), color=colour, ls="-" if colour == MOTION else "--", lw=1.8, label=label
+    )
 
 
 def _helix(axes: Axes, screw: ScrewLine, base: Array, size: float) -> None:

@@ -100,3 +100,34 @@ def test_every_limb_says_how_its_inverse_kinematics_is_solved(cli):
     assert all(limb["solved"] == 1.0 for limb in limbs)
     text = cli("info", "bioloid").out
     assert "closed form: spherical hip  at most 8 branches  100.0% of 32 poses" in text
+
+
+def test_a_singular_loop_is_explained_and_drawn(cli, tmp_path):
+    """The four-bar driven by its rocker, moved to where crank and coupler are in line."""
+    from math import acos
+
+    crank = acos((0.2**2 + 0.24**2 - 0.14**2) / (2 * 0.2 * 0.24))
+    words = ("info", "linkages/four-bar", "--primary", "rocker", "--move", f"crank={crank}")
+    text = cli(*words, "-o", tmp_path).out
+    assert "NEAR A SINGULARITY: crank_pin is near straight or fully folded" in text
+    assert "free motion of crank: rotation about the axis (0, 0, 1) through (0, 0, 0) m" in text
+    assert "free wrench: force along (0.8125, 0.583, 0) through (0.0939, 0.0674, 0) m" in text
+    assert (tmp_path / "singularity.png").stat().st_size > 10_000
+    (loop,) = cli(*words, "--json").data["singularity"]
+    assert loop["free"]["body"] == "crank"
+    assert loop["free"]["wrench"]["pitch"] == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "message"),
+    [
+        (["--move", "crank"], 2, "--move 'crank' is no assignment; write --move crank=0.5"),
+        (["--move", "crunk=1"], 2, "Did you mean 'crank'"),
+        (["--move", "rocker=1"], 2, "rocker is secondary"),
+        (["--primary", "crank", "--primary", "rocker"], 2, "make secondary"),
+    ],
+)
+def test_a_move_or_a_choice_that_cannot_be_is_refused(cli, words, code, message):
+    called = cli("info", "linkages/four-bar", *words)
+    assert called.code == code
+    assert message in called.err
