@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from screwkin.mechanism.closure import close_loops
     from screwkin.mechanism.mechanism import Mechanism
     from screwkin.mechanism.quantities import network_matrix, secondary_rates, virtual_motion
+    from screwkin.mechanism.redundancy import least_rates
     from screwkin.mechanism.singularity import singularity_report
     from screwkin.mechanism.statics import static_forces
     from screwkin.mechanism.tip_motion import joint_rates
@@ -64,6 +65,7 @@ _HOMES = {
     "mechanism.closure": "close_loops",
     "mechanism.mechanism": "Mechanism",
     "mechanism.quantities": "network_matrix secondary_rates virtual_motion",
+    "mechanism.redundancy": "least_rates",
     "mechanism.singularity": "singularity_report",
     "mechanism.statics": "static_forces",
     "mechanism.tip_motion": "joint_rates",
@@ -103,6 +105,7 @@ __all__ = [
     "inverse_dynamics",
     "jacobian",
     "joint_rates",
+    "least_rates",
     "limb_ik",
     "link_poses",
     "load_gait",
