@@ -62,7 +62,7 @@ def turns(*links: str) -> list[sk.VirtualChain]:
 
 
 @given(sun=teeth, planet=teeth)
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=3, deadline=None)
 def test_a_planetary_gear_has_the_ratio_of_willis_over_whole_turns(sun, planet):
     """The ring is held by a chain: one turn of the sun turns the arm by sun / (sun + ring) of it."""
     robot, ring = planetary(sun, planet), sun + 2 * planet
@@ -81,7 +81,7 @@ def test_a_planetary_gear_has_the_ratio_of_willis_over_whole_turns(sun, planet):
 
 
 @given(sun=teeth, planet=teeth, rates=st.tuples(st.floats(-3, 3), st.floats(-3, 3)))
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=3, deadline=None)
 def test_wheels_roll_on_one_another_without_slip(sun, planet, rates):
     """At the pitch points both wheels move alike: each meshes by a screw through the pitch point."""
     robot = planetary(sun, planet)
@@ -100,7 +100,7 @@ def test_wheels_roll_on_one_another_without_slip(sun, planet, rates):
 
 
 @given(sun=teeth, planet=teeth, torque=st.floats(0.1, 5))
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=3, deadline=None)
 def test_torques_in_a_planetary_gear_are_those_by_hand(sun, planet, torque):
     """A torque on the sun: T / r_sun on the teeth at both sides of the planet, twice that on its pin."""
     robot, ring = planetary(sun, planet, held=True), sun + 2 * planet
