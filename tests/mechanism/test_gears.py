@@ -31,7 +31,8 @@ def follows(leader: str, ratio: float) -> str:
 
 
 Z = (0, 0, 1)
-HELD = '[[closure]]\nname = "housing"\nlink_a = "ring"\nframe_a = { xyz = [0, 0, 0] }\nlink_b = "ground"\nframe_b = { xyz = [0, 0, 0] }\n'
+FRAME = "{ xyz = [0, 0, 0] }"
+HELD = f'[[closure]]\nname = "housing"\nlink_a = "ring"\nframe_a = {FRAME}\nlink_b = "ground"\nframe_b = {FRAME}\n'
 
 
 @cache
