@@ -31,8 +31,14 @@ def follows(leader: str, ratio: float) -> str:
 
 
 Z = (0, 0, 1)
-FRAME = "{ xyz = [0, 0, 0] }"
-HELD = f'[[closure]]\nname = "housing"\nlink_a = "ring"\nframe_a = {FRAME}\nlink_b = "ground"\nframe_b = {FRAME}\n'
+HELD = """
+[[closure]]
+name = "housing"
+link_a = "ring"
+frame_a = { xyz = [0, 0, 0] }
+link_b = "ground"
+frame_b = { xyz = [0, 0, 0] }
+"""
 
 
 @cache
