@@ -19,6 +19,7 @@ from screwkin.servo.bus import Bus, open_line
 from screwkin.servo.calibrate import calibrated, turned, zeros
 from screwkin.servo.examine import mending, servo_registers_differ
 from screwkin.servo.gate import Bounds
+from screwkin.servo.line import BusError, LineLostError
 from screwkin.servo.packets import ProtocolName
 from screwkin.servo.profiles import load_profile
 from screwkin.servo.protocols import protocol_named
@@ -98,8 +99,15 @@ def _examined(
         mend = mending(bus, robot)
         apart = [one for k in chosen for one in servo_registers_differ(bus, bounds, k, mend)]
         place = bounds.profiles[chosen[0]].register("model_number")
-        trip = measured(bus, [bounds.ids[k] for k in chosen], place.address, place.width)
-    return apart, trip
+        mute = {one.id for one in apart if one.register in ("id", "status_level")}
+        asked = [bounds.ids[k] for k in chosen if bounds.ids[k] not in mute]
+        try:
+            return apart, measured(bus, asked, place.address, place.width) if asked else None
+        except LineLostError:
+            raise
+        except BusError as error:
+            remark(f"round trips could not be measured: {error}")
+            return apart, None
 
 
 def bus_read(
