@@ -17,6 +17,7 @@ from screwkin.errors import InputError
 from screwkin.mechanism.action_choice import ActionChoice, action_choice
 from screwkin.mechanism.choice import closed_mechanism
 from screwkin.mechanism.statics import StaticForces, static_forces
+from screwkin.mechanism.symbolic_statics import symbolic_statics
 from screwkin.model.display import listing
 from screwkin.model.robot import Robot
 from screwkin.model.state import State, home
@@ -56,6 +57,10 @@ def forces(
         typer.Option(help="A tip on the floor or a held closure; may be repeated. Default: the soles."),
     ] = None,
     posture: Annotated[str | None, typer.Option(help="A posture of the table; default home.")] = None,
+    symbolic: Annotated[
+        bool,
+        typer.Option("--symbolic", help="Efforts of a linkage in closed form, for one JOINT=EFFORT."),
+    ] = False,
     friction: Annotated[
         float | None, typer.Option(help="TRAJ: coefficient of friction of the floor; default 0.8.")
     ] = None,
@@ -84,12 +89,16 @@ def forces(
         "--output": output,
     }  # fmt: skip
     if Path(robot).suffix == ".npz":
-        _refuse(of_robot, f"for robots, and {robot} is a trajectory")
+        _refuse(of_robot | {"--symbolic": symbolic}, f"for robots, and {robot} is a trajectory")
         if pull and friction is not None:
             raise InputError("--pull is without friction; leave out one of --pull and --friction")
         limit = None if pull else FRICTION if friction is None else friction
         return forces_along(Path(robot), Wanted(limit, engine or VALIDATED, plots, output, as_json))
     _refuse(of_trajectory, f"for a trajectory.npz, and {robot} is none")
+    if symbolic:
+        numbers = of_robot.keys() - {"--load", "--active"}
+        _refuse({name: of_robot[name] for name in of_robot if name in numbers}, "no part of a closed form")
+        return _closed_form(load_robot(robot, symbolic=True), load or [], active, as_json)
     table = load_robot(robot)
     return _statics(table, posture, load or [], weights, down, impose or [], active, contact, as_json)
 
@@ -123,6 +132,26 @@ def _statics(
         print_json(_data(robot, result, choice))
     else:
         print(_text(robot, result, choice))
+    return 0
+
+
+def _closed_form(robot: Robot, load: Sequence[str], active: Sequence[str] | None, as_json: bool) -> int:
+    """Efforts of a linkage in symbols."""
+    loads = _loads(load)
+    if len(loads) != 1 or not isinstance(next(iter(loads.values())), float):
+        raise InputError("--symbolic takes one load on a joint; write --load rocker=10")
+    (name,) = loads
+    driving = active or [n for n in closed_mechanism(Robot.from_text(robot.text)).primary if n != name]
+    solution = symbolic_statics(robot, name, driving)
+    lines = {joint: str(effort) for joint, effort in solution.efforts.items()}
+    if as_json:
+        print_json({"robot": robot.name, "load": name, "efforts": lines})
+        return 0
+    where = ", ".join(f"{symbol} of {joint}" for joint, symbol in solution.symbols.items())
+    print(
+        f"{robot.name}: efforts that balance load, an effort at {name}\n{aligned(list(lines.items()), '  ')}"
+    )
+    print(f"  positions: {where}")
     return 0
 
 

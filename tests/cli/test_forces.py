@@ -70,6 +70,20 @@ def test_what_cannot_be_is_refused_in_one_line(cli, words, message):
     assert called.err.count("\n") == 1
 
 
+def test_a_linkage_s_efforts_have_a_closed_form(cli):
+    text = cli(*FOUR_BAR, "--load", "rocker=10", "--symbolic").out
+    form = "-crank*load*sin(q_crank_pin)/(crank*sin(q_crank_pin) - ground*sin(q_crank + q_crank_pin))"
+    assert f"crank  {form}" in text
+    told = cli(*FOUR_BAR, "--load", "rocker=10", "--symbolic", "--json").data
+    assert told == {"robot": "four-bar", "load": "rocker", "efforts": {"crank": form}}
+    for words in (["--load", "coupler=1,2,0"], [], ["--load", "rocker=1", "--load", "crank_pin=1"]):
+        called = cli(*FOUR_BAR, *words, "--symbolic")
+        assert (called.code, "--symbolic takes one load on a joint" in called.err) == (2, True)
+    assert (
+        "--weights: no part of a closed form; leave it out" in cli(*FOUR_BAR, "--symbolic", "--weights").err
+    )
+
+
 def test_loads_that_nothing_holds_are_an_answer_that_is_no(cli):
     """The rod of an RSSR spins between its balls, whatever the crank does."""
     called = cli("forces", "linkages/rssr", "--load", "rod=1,2,3,0,0,0", "--active", "crank")
