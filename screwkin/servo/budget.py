@@ -101,9 +101,8 @@ def budget(
     facts = codec(profiles[0].protocol).FACTS
     rows = [_goal_rows(profile) for profile in profiles]
     goals = sum(len(row) + sum(row) for row in rows)  # an id before each
-    packets = sum(
-        len(row) for row in {profile.model: row for profile, row in zip(profiles, rows, strict=True)}.values()
-    )
+    models = {profile.model: row for profile, row in zip(profiles, rows, strict=True)}
+    packets = sum(map(len, models.values()))
     longest = max(block_of(profile)[1] for profile in profiles)
     more = (facts.answer_size + longest) * byte + return_delay  # an answer that follows another
     read = facts.read_size * byte + more + adapter if answer is None else answer

@@ -47,6 +47,7 @@ class Instruction(IntEnum):
     STATUS = 0x55
     SYNC_READ = 0x82
     SYNC_WRITE = 0x83
+    FAST_SYNC_READ = 0x8A
     BULK_READ = 0x92
     BULK_WRITE = 0x93
 
@@ -108,7 +109,7 @@ class Request:
     """What one servo is asked: ``length`` bytes to read, ``data`` to write, at ``address``.
 
     ``answers`` says whether it may be answered at all, whatever the servo's status level; ``after`` names
-    the servos whose answers come before its own.
+    the servos whose answers come before its own; ``joined`` all those that answer in one packet.
     """
 
     kind: Kind
@@ -117,6 +118,7 @@ class Request:
     data: bytes = b""
     answers: bool = True
     after: tuple[int, ...] = ()
+    joined: tuple[int, ...] = ()
 
 
 def sound_packets(

@@ -17,7 +17,7 @@ Source: the maker's description of protocol 2.0.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from screwkin.servo.line import ErrorBit
 from screwkin.servo.packets import (
@@ -113,6 +113,24 @@ def status(id: int, error: int, data: bytes = b"") -> bytes:
     return pack(Packet(id, Instruction.STATUS, bytes((error,)) + data))
 
 
+def joined_status(count: int, length: int, answers: Sequence[tuple[int, int, bytes]]) -> bytes:
+    """The one packet with which servos answer a fast sync read, as far as they do.
+
+    Each adds error, id, data, and the crc of all that stands before; the last of these is that of the packet.
+
+    Args:
+        count: of the servos that are asked.
+        length: bytes that each is asked for.
+        answers: id, error and data of those that answer before the first that does not.
+    """
+    size = 1 + count * (length + 4)
+    packet = _HEADER + bytes((BROADCAST,)) + size.to_bytes(2, "little") + bytes((Instruction.STATUS,))
+    for id, error, data in answers:
+        packet += bytes((error, id)) + data
+        packet += crc16(packet).to_bytes(2, "little")
+    return packet
+
+
 def errors(byte: int) -> frozenset[ErrorBit]:
     """What an answer's error byte says."""
     number = byte & ~_ALERT
@@ -157,11 +175,12 @@ def command_for(packet: Packet, id: int) -> Request | None:
             return None
         case Instruction.SYNC_WRITE:
             return sync_write_command(params[:4], params[4:], id, width=2) if everyone else None
-        case Instruction.SYNC_READ:
+        case Instruction.SYNC_READ | Instruction.FAST_SYNC_READ:
             before = ids_before(list(params[4:]), id)
             if before is None or not everyone:
                 return None
-            return Request("read", _number(params[:2]), _number(params[2:4]), after=before)
+            joined = tuple(params[4:]) if packet.instruction == Instruction.FAST_SYNC_READ else ()
+            return Request("read", _number(params[:2]), _number(params[2:4]), after=before, joined=joined)
         case Instruction.BULK_READ:
             wanted = {row[0]: row for row in rows(params, 5) or ()}
             before = ids_before(list(wanted), id)

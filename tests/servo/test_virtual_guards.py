@@ -5,6 +5,7 @@ The makers' own driver writes and reads, in simulated time.
 
 from __future__ import annotations
 
+import dynamixel_sdk as sdk
 import pytest
 
 from screwkin.model.table import load_robot
@@ -157,6 +158,32 @@ def test_the_current_of_all_lowers_the_voltage_of_each():
     for id in range(1, 7):
         bench.write("torque_enable", 0, id=id)
     assert bench.read("present_voltage") == 119
+
+
+@pytest.mark.parametrize("model", X)
+def test_a_fast_sync_read_is_answered_in_one_packet_by_firmware_that_knows_it(model):
+    """The makers' driver asks and takes the packet apart."""
+    bench = Bench(model, count=4)
+    for servo in bench.servos:
+        servo.body.angle = 10 * servo.id * bench.profile.tick
+    place = bench.profile.register("present_position")
+
+    def asked(ids):
+        group = sdk.GroupSyncRead(bench.bus._port, bench.bus._handler, place.address, place.width)
+        assert all(group.addParam(id) for id in ids)
+        before, result = bench.line.answers, group.fastSyncRead()
+        assert bench.line.answers - before <= 1
+        bench.clock.sleep(0.1)
+        bench.line.reset_input_buffer()
+        ok = result == sdk.COMM_SUCCESS
+        return [group.getData(id, place.address, place.width) for id in ids] if ok else None
+
+    known = bench.profile.fast_sync_read is not None
+    assert asked([3, 1, 4]) == ([2078, 2058, 2088] if known else None)
+    assert asked([3, 9, 4]) is None  # the packet ends with the first
+    for servo in bench.servos:
+        servo.put("firmware", 40)
+    assert asked([3, 1, 4]) is None
 
 
 @pytest.mark.parametrize("model", X)

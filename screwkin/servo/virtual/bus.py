@@ -16,6 +16,7 @@ from typing import Protocol, Self
 
 import numpy as np
 
+from screwkin.servo import protocol2
 from screwkin.servo.packets import BROADCAST, Packet, Request
 from screwkin.servo.protocols import Codec, codec
 from screwkin.servo.virtual.faults import InjectedFault, affected, deafened
@@ -199,6 +200,8 @@ class VirtualBus:
             if command is not None:
                 requests.append((servo, command))
         requests.sort(key=lambda pair: len(pair[1].after))
+        if requests and requests[0][1].joined:
+            return self._answer_jointly(requests, time)
         said: set[int] = set()
         for id in dict.fromkeys(servo.id for servo, _ in requests):
             mine = [pair for pair in requests if pair[0].id == id]
@@ -210,6 +213,31 @@ class VirtualBus:
             if spoken:
                 said.add(id)
         return time
+
+    def _answer_jointly(self, requests: list[tuple[VirtualServo, Request]], time: float) -> float:
+        """Let servos answer in one packet, up to the first that does not; when the line is free again."""
+        asked, delay = requests[0][1].joined, 0.0
+        answers: list[tuple[int, int, bytes]] = []
+        for servo, command in requests:
+            heard = command.after == asked[: len(answers)]
+            answer = servo.answer(command, time) if heard and not self._deaf(servo, command, time) else None
+            if answer is None:
+                break
+            delay = delay or servo.get("return_delay") * 2e-6
+            answers.append((servo.id, *answer))
+        if not answers:
+            return time
+        data = protocol2.joined_status(len(asked), requests[0][1].length, answers)
+        return self._say(answers[0][0], [(delay, data)], time)[0]
+
+    def _deaf(self, servo: VirtualServo, command: Request, time: float) -> bool:
+        """Whether a command does not reach a servo; those that do are witnessed."""
+        self._live_through(time)
+        if deafened(self._faults, servo.id, time, self._random):
+            return True
+        if self._witness is not None:
+            self._witness(time, servo.id, command)
+        return False
 
     def _load_supply(self, time: float) -> None:
         """Let the current of all servos lower the voltage of each."""
@@ -223,11 +251,8 @@ class VirtualBus:
     def _answer(self, servo: VirtualServo, command: Request, time: float) -> tuple[float, bytes] | None:
         """What a servo answers: its return delay, and the bytes."""
         id = servo.id  # the command may change it
-        self._live_through(time)
-        if deafened(self._faults, id, time, self._random):
+        if self._deaf(servo, command, time):
             return None
-        if self._witness is not None:
-            self._witness(time, id, command)
         answer = servo.answer(command, time)
         if answer is None:
             return None

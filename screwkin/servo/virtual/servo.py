@@ -177,6 +177,8 @@ class VirtualServo:
         """Carry out a command at a time [s]; error byte and data to answer, None for silence."""
         if time < self.silent_until or self.body.supply < self._least_voltage:
             return None
+        if command.joined and self.get("firmware") < (self.profile.fast_sync_read or math.inf):
+            return None  # it does not know the instruction, which is none of its own
         self.advance(time)
         self._heard = time
         outcome, data = self._carry_out(command, time)
