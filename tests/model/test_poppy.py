@@ -20,6 +20,7 @@ from screwkin.model.dh_csv import load_dh
 from screwkin.model.library import data_folder, robot_names
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
+from screwkin.servo.profiles import load_profile
 from tests.model.chains import fk_by_matrices, limb_table, lines
 
 LEG = ("hip_roll", "hip_yaw", "hip_pitch", "knee", "ankle_pitch", "ankle_roll")
@@ -72,7 +73,7 @@ def test_limits_are_table_1_with_the_hip_pitch_turned_and_the_right_leg_mirrored
     right = [(-45, 25), (-60, 40), (-100, 60), (-6, 112), (-35, 30), (-35, 35)]
     found = [(math.degrees(joint.lower), math.degrees(joint.upper)) for joint in robot.joints]
     np.testing.assert_allclose(found, left + right, atol=1e-12)
-    assert {joint.effort for joint in robot.joints} == {2.0}
+    assert {joint.effort for joint in robot.joints} == {load_profile("SR-518").stall_torque}
     assert all(math.isinf(joint.velocity) for joint in robot.joints)
     assert robot.servos["stiffness"] == 60.0
 
