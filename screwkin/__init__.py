@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from screwkin.gait.balance import Balance, zmp
     from screwkin.gait.files import load_gait
     from screwkin.gait.fitting import fitting_gait
+    from screwkin.gait.listed import footsteps
     from screwkin.gait.record import Gait
     from screwkin.gait.walk import walk
     from screwkin.ik.limb import limb_ik
@@ -55,6 +56,7 @@ _HOMES = {
     "gait.balance": "Balance zmp",
     "gait.files": "load_gait",
     "gait.fitting": "fitting_gait",
+    "gait.listed": "footsteps",
     "gait.record": "Gait",
     "gait.walk": "walk",
     "ik.limb": "limb_ik",
@@ -98,6 +100,7 @@ __all__ = [
     "com_jacobian",
     "contact_forces",
     "fitting_gait",
+    "footsteps",
     "forward_dynamics",
     "frame_pose",
     "ground_wrench",

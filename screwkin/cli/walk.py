@@ -19,6 +19,7 @@ from screwkin.errors import InputError
 from screwkin.files import atomic_write
 from screwkin.gait.files import default_gait, load_gait
 from screwkin.gait.fitting import fitting_gait
+from screwkin.gait.listed import load_footsteps, with_footsteps
 from screwkin.gait.record import Gait
 from screwkin.gait.walk import walk as walk_of
 from screwkin.gait.write import gait_toml
@@ -37,6 +38,10 @@ def walk(
         bool, typer.Option("--auto", help="A gait that fits the robot; limbs are found where none are named.")
     ] = False,
     steps: Annotated[int | None, typer.Option(help="Number of steps; default: the gait's.")] = None,
+    list_of_steps: Annotated[
+        Path | None,
+        typer.Option("--footsteps", metavar="FILE", help="A CSV file of footholds: x, y [m], yaw [rad]."),
+    ] = None,
     assignments: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Change a parameter of the gait; may be repeated."),
@@ -66,10 +71,12 @@ def walk(
     assignments = [*(assignments or []), *([] if com is None else [f"com={com}"])]
     if auto and gait is not None:
         raise InputError("--auto chooses the gait; leave --gait out")
-    name = gait or default_gait(table.name)
+    name = gait or (default_gait(table.name) if list_of_steps is None else stepping_gait(table.name))
     chosen = changed(fitting_gait(table), assignments, rate) if auto else chosen_gait(name, assignments, rate)
+    if list_of_steps is not None:
+        chosen = with_footsteps(chosen, load_footsteps(list_of_steps))
     steps = chosen.steps if steps is None else steps
-    command = command_of(robot, None if auto else name, steps, assignments, rate)
+    command = command_of(robot, None if auto else name, steps, assignments, rate, list_of_steps)
     with output_folder(output, "walk", table.name) as folder:
         account, remedied = _planned(table, chosen, steps, command), None
         if wanted is not None:
@@ -91,6 +98,12 @@ def walk(
         if remedied is not None:
             print(remedied.text())
     return 0
+
+
+def stepping_gait(robot: str) -> str:
+    """The gait that steps onto listed footholds if none is chosen: the robot's own, if its kind can."""
+    own = default_gait(robot)
+    return own if load_gait(own).kind != "geometric" else "auto"
 
 
 def chosen_gait(name: str, assignments: Sequence[str], rate: float | None) -> Gait:
@@ -122,11 +135,16 @@ def write_auto(robot: Robot, gait: Gait, folder: Path) -> None:
 
 
 def command_of(
-    robot: str, gait: str | None, steps: int, assignments: Sequence[str], rate: float | None
+    robot: str,
+    gait: str | None,
+    steps: int,
+    assignments: Sequence[str],
+    rate: float | None,
+    footsteps: Path | None = None,
 ) -> str:
     """The command line that plans the same trajectory again, wherever its files go."""
     words = ["screwkin", "walk", robot, *(["--auto"] if gait is None else ["--gait", gait])]
-    words += ["--steps", str(steps)]
+    words += ["--steps", str(steps), *([] if footsteps is None else ["--footsteps", str(footsteps)])]
     words += [word for text in assignments for word in ("--set", text)]
     words += [] if rate is None else ["--rate", f"{rate:g}"]
     return shlex.join(words)

@@ -72,10 +72,10 @@ def follow(robot: Robot, gait: Gait, steps: int, at_rest: tuple[str, ...] = ()) 
             notes += tuple(_rests(robot, gait, arm, why) for arm, why in unable.items())
             continue
         try:
-            if gait.kind == "preview":
-                planned = preview_plan(mechanism, gait, stance, steps)
-            else:
+            if gait.kind == "geometric":
                 planned = plan(gait, stance, steps)
+            else:
+                planned = preview_plan(mechanism, gait, stance, steps)
             solution = positions(mechanism, planned)
             motion = differentiate(mechanism, planned, solution.state)
         except (UnreachableError, SingularError, LimitError) as error:

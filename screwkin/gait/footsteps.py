@@ -51,7 +51,7 @@ def footholds(gait: Gait, stance: Stance, steps: int) -> tuple[Foothold, ...]:
     With P(n) the place of the waist at the boundary before step n: ``alternate`` lands at P(n + 1.5), half
     a step ahead of the waist, as the walking paper (eq. 19-20); ``close`` lands the leading foot (even n)
     at P(n + 2) and the closing one beside it at P(n + 1); ``parallel`` starts at P(0) and lands at P(n + 1),
-    the last swing beside the foot that stands.
+    the last swing beside the foot that stands. A gait that lists its footholds begins as ``parallel``.
 
     Args:
         gait: its path and how feet pass each other.
@@ -64,6 +64,13 @@ def footholds(gait: Gait, stance: Stance, steps: int) -> tuple[Foothold, ...]:
         x, y, yaw = path.place(np.array(s), side * (stance.foot_y + gait.spread)).tolist()
         return Foothold(stance.foot(side).name, step, x, y, yaw)
 
+    if gait.places:
+        yaws = np.unwrap([0.0, *(place.yaw for place in gait.places)])[1:].tolist()
+        ends = [
+            Foothold(stance.foot(swing_side(gait, n)).name, n, place.x, place.y, yaw)
+            for n, (place, yaw) in enumerate(zip(gait.places[:steps], yaws, strict=False))
+        ]
+        return (hold(lead, -1, 0.0), hold(-lead, -1, 0.0), *ends)
     half = 0.5 if gait.footholds == "alternate" else 0.0
     holds = [hold(lead, -1, -half), hold(-lead, -1, half)]
     for n in range(steps):

@@ -54,5 +54,5 @@ def path_of(gait: Gait) -> Path:
     The waist starts over x = stride/4 between the feet (alternate: walking paper, the right foot at 0, the
     left at stride/2) or over 0 (close, parallel: the feet side by side).
     """
-    start = 0.25 * gait.stride if gait.footholds == "alternate" else 0.0
+    start = 0.25 * gait.stride if gait.footholds == "alternate" and not gait.places else 0.0
     return Path(start, 0.5 * gait.stride, 0.5 * gait.side, 0.5 * gait.turn)

@@ -16,7 +16,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, pose_from_array, twist_from_array, unstack
 from screwkin.dynamics.newton_euler import Bodies, total_momentum
-from screwkin.errors import Fault, GaitError, NoSolutionError
+from screwkin.errors import Fault, GaitError, InputError, NoSolutionError
 from screwkin.gait.balance import ground_reaction
 from screwkin.gait.footsteps import Foothold, footholds, swing_side
 from screwkin.gait.motion import Motion, along
@@ -40,7 +40,7 @@ TRACKED = 1e-9
 
 
 def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -> Plan:
-    """The plan of a gait of kind ``preview``.
+    """The plan of a gait of kind ``preview`` or ``footsteps``.
 
     Args:
         mechanism: of a robot with a ``home`` posture whose joints follow from base and tips.
@@ -52,22 +52,26 @@ def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -
         Plan of (steps + 2) Tc rate samples.
 
     Raises:
-        GaitError: a setting is missing or wrong. NoSolutionError: out of reach, or feet that overlap.
+        InputError: more steps than the gait lists. GaitError: a setting is missing or wrong.
+        NoSolutionError: out of reach, or feet that overlap.
     """
     steps = whole_steps(steps)
     check_fitted(gait)
+    if gait.places and steps > len(gait.places):
+        raise InputError(f"steps is {steps}; gait {gait.name} lists {len(gait.places)} footholds")
     settings = _settings(gait)
     check_rate(gait)
     count = round((steps + 2) * gait.Tc * gait.rate)
     time = np.arange(count) / gait.rate
     phase = _phase(time, gait.Tc, steps)
-    reference = zmp_reference(gait, stance, footholds(gait, stance, steps), steps, time)
+    holds = footholds(gait, stance, steps)
+    reference, heading = zmp_reference(gait, stance, holds, steps, time), headings(gait, holds, steps)
 
     boundaries = gait.Tc * np.arange(1.0, steps + 2.0)
 
     def around(cart: CartMotion, part: slice = slice(None)) -> Plan:
         now = Motion(phase.value[part], phase.rate[part], phase.acceleration[part])
-        return plan_around(gait, stance, steps, time[part], now, _waist(gait, cart, now), boundaries)
+        return plan_around(gait, stance, steps, time[part], now, _waist(gait, heading, cart, now), boundaries)
 
     height = gait.waist_height
     if gait.com == "true":
@@ -89,7 +93,7 @@ def zmp_reference(gait: Gait, stance: Stance, holds: tuple[Foothold, ...], steps
     """Wanted ZMP (T, 2): at rest between the feet, else in the middle of the supporting sole [m].
 
     Args:
-        gait: of kind ``preview``.
+        gait: of kind ``preview`` or ``footsteps``.
         stance: soles of the robot.
         holds: from ``footholds``.
         steps: number of swings.
@@ -107,6 +111,21 @@ def zmp_reference(gait: Gait, stance: Stance, holds: tuple[Foothold, ...], steps
     share = np.clip((time / gait.Tc - number) / gait.numbers["dsp"], 0.0, 1.0)[:, None]
     levels = np.array([places[0], *places])
     return np.asarray(levels[number] + share * (levels[number + 1] - levels[number]))
+
+
+def headings(gait: Gait, holds: tuple[Foothold, ...], steps: int) -> Array:
+    """Yaw of the waist at the boundaries of the steps (steps + 1,) [rad].
+
+    Along the path of the gait; over listed footholds the mean of those that the feet then stand on.
+    """
+    if not gait.places:
+        return np.arange(steps + 1.0) * path_of(gait).turn
+    stand = {hold.foot: hold.yaw for hold in holds[:2]}
+    means = [sum(stand.values()) / 2]
+    for hold in holds[2:]:
+        stand[hold.foot] = hold.yaw
+        means.append(sum(stand.values()) / 2)
+    return np.array(means)
 
 
 def _middle(stance: Stance, hold: Foothold) -> Array:
@@ -153,16 +172,17 @@ def _phase(time: Array, Tc: float, steps: int) -> Motion:
     return Motion(value, np.where(moving, 1 / Tc, 0.0), np.zeros_like(time))
 
 
-def _waist(gait: Gait, cart: CartMotion, phase: Motion) -> Motion:
-    """Waist x, y, z, yaw (T, 4): over the cart, turning with the path by a quintic blend in each step."""
+def _waist(gait: Gait, heading: Array, cart: CartMotion, phase: Motion) -> Motion:
+    """Waist x, y, z, yaw (T, 4): over the cart, turned to the next heading by a quintic in each step."""
 
-    def blended(p: Array, order: int) -> Array:
-        u = p - np.floor(p)
+    def turned(p: Array, order: int) -> Array:
+        n = np.minimum(np.floor(p), len(heading) - 2).astype(int)
+        u, by = p - n, np.diff(heading)[n]
         if order == 0:
-            return np.asarray(np.floor(p) + u**3 * (10 + u * (6 * u - 15)))
-        return 30 * (u * (1 - u)) ** 2 if order == 1 else 60 * u * (1 - u) * (1 - 2 * u)
+            return np.asarray(heading[n] + by * u**3 * (10 + u * (6 * u - 15)))
+        return by * (30 * (u * (1 - u)) ** 2 if order == 1 else 60 * u * (1 - u) * (1 - 2 * u))
 
-    turning = along(blended, phase) * path_of(gait).turn
+    turning = along(turned, phase)
     columns = [
         np.column_stack([flat, np.full(len(flat), height), yaw])
         for flat, height, yaw in (

@@ -16,18 +16,19 @@ from typing import Any, Literal, cast
 from screwkin.errors import Fault, GaitError, near
 from screwkin.gait.free_path import read_free_waist
 from screwkin.gait.keypoints import CHANNELS, Channel, channel_faults, increases, read_channel
+from screwkin.gait.places import Place, read_places
 from screwkin.gait.relative import FREE, NOMINAL, read_lengths, relative_to_robot
 from screwkin.gait.settings import place, valid_keys
 from screwkin.model.expression import names_in, resolve_parameters
 
-Kind = Literal["geometric", "preview"]
+Kind = Literal["geometric", "preview", "footsteps"]
 Swing = Literal["cubic", "minimum-jerk"]
 Footholds = Literal["alternate", "close", "parallel"]
 Side = Literal["right", "left"]
 
 TEXTS = ("name", "description", "source")
 CHOICES: Mapping[str, tuple[str, ...]] = {
-    "kind": ("geometric", "preview"),
+    "kind": ("geometric", "preview", "footsteps"),
     "swing": ("minimum-jerk", "cubic"),
     "footholds": ("alternate", "close", "parallel"),
     "com": ("true", "waist"),
@@ -57,6 +58,7 @@ FLAT = (*TEXTS, *CHOICES, *NUMBERS)
 
 _POSITIVE = ("Tc", "lift", "waist_height", "hand_drop", "rate")
 _TABLES = ("gait", "parameters", "channel", "waist", "lengths")
+_LISTED = "foothold"
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +75,9 @@ class Gait:
     feet side by side); first: the foot that swings first. com: what a preview gait steers, the ``true`` CoM
     of all links or, naively, the ``waist``.
     swing: spline of a swing. numbers: all of these and the file's own parameters. channels: key points.
-    waist: coefficients of a free waist path, or empty. lengths: of the robot that it is fitted to [m]; empty
-    before, when every number that depends on them is NaN.
+    waist: coefficients of a free waist path, or empty. places: where the steps of kind ``footsteps`` end.
+    lengths: of the robot that it is fitted to [m]; empty before, when every number that depends on
+    them is NaN.
     """
 
     name: str
@@ -102,6 +105,7 @@ class Gait:
     channels: Mapping[str, Channel]
     waist: Mapping[str, tuple[float, ...]]
     lengths: Mapping[str, float] = field(default_factory=dict)
+    places: tuple[Place, ...] = ()
     path: str = ""
     _document: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
@@ -120,7 +124,8 @@ class Gait:
     def unfitted(self) -> tuple[str, ...]:
         """Keys whose numbers depend on lengths of a robot that is not known yet; ``fitted`` knows it."""
         channels = [f"channel.{c.name}" for c in self.channels.values() if math.isnan(c.at[0] + c.value[0])]
-        return (*(key for key, value in self.numbers.items() if math.isnan(value)), *channels)
+        holds = [f"foothold {i + 1}" for i, p in enumerate(self.places) if math.isnan(p.x + p.y + p.yaw)]
+        return (*(key for key, value in self.numbers.items() if math.isnan(value)), *channels, *holds)
 
     def replace(self, **parameters: Any) -> Gait:
         """The gait with other parameters; numbers may be given as text or formulas, as on a command line.
@@ -167,11 +172,12 @@ def gait_from_dict(document: Mapping[str, Any], path: str = "<gait>") -> Gait:
     channels = _channels(tables, flat, numbers, faults)
     waist = read_free_waist(tables["waist"], faults)
     _check_complete(flat["kind"], channels, waist, tables["channel"], faults)
+    open_ = frozenset() if lengths else relative_to_robot(_raw_numbers(flat, tables["parameters"]))
+    places = _places(document, flat, numbers, open_, faults)
     if faults:
         raise GaitError(path, faults)
     values = {name: cast(float, value) for name, value in numbers.items() if name not in NOMINAL}
     if not lengths:
-        open_ = relative_to_robot(_raw_numbers(flat, tables["parameters"]))
         values |= dict.fromkeys(open_ & {*values}, math.nan)
         channels = {name: _without_numbers(c, tables["channel"][name], open_) for name, c in channels.items()}
     return Gait(
@@ -180,17 +186,43 @@ def gait_from_dict(document: Mapping[str, Any], path: str = "<gait>") -> Gait:
         channels=channels,
         waist=waist,
         lengths=lengths,
+        places=places,
         path=path,
-        _document=copy.deepcopy({**tables, "gait": flat}),
+        _document=copy.deepcopy({**tables, "gait": flat, **({_LISTED: document[_LISTED]} if places else {})}),
     )
+
+
+def _places(
+    document: Mapping[str, Any],
+    flat: dict[str, Any],
+    numbers: dict[str, float | None],
+    unknown: frozenset[str],
+    faults: list[Fault],
+) -> tuple[Place, ...]:
+    """Footholds of a gait that lists them; their number is that of the steps."""
+    listed = flat["kind"] == "footsteps"
+    if _LISTED not in document:
+        if listed:
+            fix = "Give [[foothold]] with x, y, yaw for every step, or walk(robot, gait, footsteps)"
+            faults.append(Fault("[[foothold]]", "", "missing", fix))
+        return ()
+    if not listed:
+        found = f"a gait of kind {flat['kind']!r} makes its own footholds"
+        faults.append(Fault("[[foothold]]", "", found, 'Set kind = "footsteps"'))
+        return ()
+    places = read_places(document[_LISTED], numbers, unknown, faults)
+    if not document[_LISTED]:
+        faults.append(Fault("[[foothold]]", "", "no step is listed", "Give one at least"))
+    flat["steps"] = numbers["steps"] = len(places)
+    return places
 
 
 def _tables(document: Mapping[str, Any], faults: list[Fault]) -> dict[str, dict[str, Any]]:
     """The document's tables, empty where absent."""
     for key in document:
-        if key not in _TABLES:
-            found = "unknown table"
-            faults.append(Fault(f"[{key}]", "", found, f"{near(key, _TABLES)}Valid: {', '.join(_TABLES)}"))
+        if key not in (*_TABLES, _LISTED):
+            fix = f"{near(key, (*_TABLES, _LISTED))}Valid: {', '.join((*_TABLES, _LISTED))}"
+            faults.append(Fault(f"[{key}]", "", "unknown table", fix))
     tables: dict[str, dict[str, Any]] = {}
     for name in _TABLES:
         table = document.get(name, {})

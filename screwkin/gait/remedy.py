@@ -38,10 +38,25 @@ def with_remedy(error: NoSolutionError, robot: Robot, gait: Gait, steps: int) ->
         gait: fitted to it.
         steps: of the walk.
     """
+    if gait.places:
+        error.args = (f"{error}. {_listed(error, gait)}", *error.args[1:])
+        return error
     trial = _Trial(robot, gait, steps)
     limb = getattr(error, "limb", "")
     error.args = (f"{error}. {'; or '.join(_legs(trial, limb)) or _unknown(gait)}", *error.args[1:])
     return error
+
+
+def _listed(error: NoSolutionError, gait: Gait) -> str:
+    """Which foothold of a list is being stepped onto where a limb fails, and what to change."""
+    sample = getattr(error, "sample", -1)
+    if sample < 0:
+        return "Move the footholds that the message names"
+    n = min(max(math.floor(sample / (gait.rate * gait.Tc)) - 1, 0), len(gait.places) - 1)
+    place = gait.places[n]
+    where = f"x {place.x:g}, y {place.y:g} m, yaw {math.degrees(math.remainder(place.yaw, math.tau)):.4g} deg"
+    nearer = f"bring it nearer, or lower waist_height = {gait.waist_height:g}"
+    return f"This is in step {n + 1}, onto {where}: {nearer}"
 
 
 @dataclass(frozen=True, eq=False)

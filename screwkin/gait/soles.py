@@ -59,15 +59,18 @@ def check_soles(gait: Gait, stance: Stance, feet: dict[str, Motion], time: Array
     )
     gap = sole_distance(a, b)
     if gap.min() < -_TOUCH:
-        early = int(np.argmax(gap < -_TOUCH))
+        early = float(time[int(np.argmax(gap < -_TOUCH))])
         raise NoSolutionError(
             f"gait {gait.name}: {first.name} and {second.name} overlap from"
-            f" {time[early]:.3f} s on, by up to {-1e3 * gap.min():.1f} mm. {_advice(gait)}"
+            f" {early:.3f} s on, by up to {-1e3 * gap.min():.1f} mm. {_advice(gait, early)}"
         )
     return float(gap.min())
 
 
-def _advice(gait: Gait) -> str:
+def _advice(gait: Gait, time: float) -> str:
+    if gait.places:
+        n = min(max(int(time / gait.Tc) - 1, 0), len(gait.places) - 1)
+        return f"This is in step {n + 1}: move its foothold, or the ones before and after it, apart"
     towards = gait.side if gait.side != 0 else gait.turn
     wanted = "left" if towards > 0 else "right"
     if gait.footholds == "close" and towards != 0 and gait.first != wanted:

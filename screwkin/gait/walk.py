@@ -14,6 +14,7 @@ from screwkin.files import text_sha256, versions
 from screwkin.gait.balance import ground_margin, ground_reaction, soles_on_floor
 from screwkin.gait.follow import Followed, follow
 from screwkin.gait.lengths import fitted
+from screwkin.gait.listed import Footsteps, with_footsteps
 from screwkin.gait.realise import free_rotations
 from screwkin.gait.record import Gait
 from screwkin.gait.remedy import with_remedy
@@ -27,14 +28,15 @@ SEEN = 0.05
 """Angle from which a foot's deviation from its plan is noted [deg]."""
 
 
-def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") -> Trajectory:
+def walk(robot: Robot, gait: Gait, steps: int | Footsteps | None = None, command: str = "") -> Trajectory:
     """The whole-body trajectory of a gait.
 
     Args:
         robot: with two legs, soles and a ``home`` posture; arms of three joints and more swing. Joints that
             move no limb, or more than one, rest at home.
         gait: from ``load_gait``.
-        steps: number of steps, at least 1; default: the gait's own, 8 unless its file says otherwise.
+        steps: number of steps, at least 1; default: the gait's own, 8 unless its file says otherwise. Or a
+            list from ``footsteps``, which a gait of kind ``preview`` or ``footsteps`` steps onto.
         command: the command line to record in the file.
 
     Returns:
@@ -55,6 +57,8 @@ def walk(robot: Robot, gait: Gait, steps: int | None = None, command: str = "") 
     """
     expect(robot, Robot, "robot", 'load_robot("NAME")')
     expect(gait, Gait, "gait", 'load_gait("NAME")')
+    if isinstance(steps, Footsteps):
+        gait, steps = with_footsteps(gait, steps), len(steps)
     gait = fitted(gait, robot)
     steps = gait.steps if steps is None else steps
     try:

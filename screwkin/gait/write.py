@@ -22,6 +22,8 @@ def gait_toml(gait: Gait) -> str:
             lines += ["", f"[{table}]", *_rows(document[table])]
     for name, channel in document.get("channel", {}).items():
         lines += ["", f"[channel.{name}]", *_rows(channel)]
+    for row in document.get("foothold", []):
+        lines += ["", "[[foothold]]", *_rows(row)]
     return "\n".join(lines).lstrip("\n") + "\n"
 
 

@@ -1,0 +1,146 @@
+"""Lists of footsteps: from numbers or a file to a gait that walks them."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+from screwkin.errors import Fault, GaitError, InputError, near
+from screwkin.gait.places import KEYS, Place, read_places
+from screwkin.gait.record import CHOICES, Gait, Side, gait_from_dict
+from screwkin.model.toml import read_text
+
+FOOT = "foot"
+"""Column of a file that says which foot swings; it may be left out."""
+
+
+@dataclass(frozen=True)
+class Footsteps:
+    """Where a walk's steps end, one after the other, feet alternating; from ``footsteps``.
+
+    places: of the foot that swings, in the world. first: the foot that swings first.
+    """
+
+    places: tuple[Place, ...]
+    first: Side = "right"
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+
+def footsteps(places: Iterable[Sequence[float]], first: Side = "right") -> Footsteps:
+    """Footholds to walk on, for ``walk(robot, gait, footsteps)``.
+
+    The robot starts with its feet side by side, the middle between them over the origin, facing along x.
+
+    Args:
+        places: (x, y, yaw) of every step, x, y [m] and yaw [rad] of the frame of the foot that swings, in the
+            world; feet alternate. A yaw is meant as the one nearest to that of the step before.
+        first: ``right`` or ``left``: the foot that swings first.
+
+    Returns:
+        Footsteps.
+
+    Raises:
+        GaitError: no step at all, or numbers that are none; it names the step. InputError: another foot.
+
+    Example:
+        >>> import screwkin as sk
+        >>> steps = sk.footsteps([(0.05, -0.04, 0.0), (0.05, 0.04, 0.0)])
+        >>> robot = sk.load_robot(sk.robot_names()[0])
+        >>> bool(sk.walk(robot, sk.load_gait("preview"), steps).margin.min() > 0)
+        True
+    """
+    if first not in CHOICES["first"]:
+        raise InputError(f"first is {first!r}; expected 'right' or 'left'")
+    rows = [_row(i, place) for i, place in enumerate(places)]
+    return _read(rows, first, "footsteps")
+
+
+def load_footsteps(path: str | Path) -> Footsteps:
+    """The footsteps of a CSV file with the columns ``x, y, yaw`` [m, rad] and, if wanted, ``foot``.
+
+    Args:
+        path: of the file. Numbers may be formulas, such as ``10*deg``. Without ``foot`` the right foot swings
+            first; with it feet must alternate.
+
+    Raises:
+        GaitError: the file cannot be read, or rows are wrong; all faults are named at once.
+    """
+    lines = list(csv.reader(io.StringIO(read_text(Path(path), GaitError)), skipinitialspace=True))
+    rows = [(i, line) for i, line in enumerate(lines, 1) if any(cell.strip() for cell in line)]
+    names = [name.strip() for name in rows[0][1]] if rows else []
+    known = [*KEYS, FOOT]
+    faults = [
+        Fault("row 1", name, "unknown column", f"{near(name, known)}Valid: {', '.join(known)}")
+        for name in names
+        if name not in known
+    ]
+    faults += [
+        Fault("row 1", key, "missing column", "Begin with a row x,y,yaw") for key in KEYS if key not in names
+    ]
+    faults += [
+        Fault(f"row {i}", "", f"{len(line)} cells for {len(names)} columns", "Give every column a cell")
+        for i, line in rows
+        if len(line) != len(names)
+    ]
+    if faults:
+        raise GaitError(str(path), faults)
+    table = [dict(zip(names, (cell.strip() for cell in line), strict=True)) for _, line in rows[1:]]
+    feet = [row.pop(FOOT, "") for row in table]
+    first = feet[0] if feet and feet[0] else "right"
+    other = {"right": "left", "left": "right"}
+    wanted = [first if i % 2 == 0 else other.get(first, "") for i in range(len(feet))]
+    wrong = [
+        Fault(f"row {i}", FOOT, f"{foot!r} where the {side or 'right or left'} foot swings", "Feet alternate")
+        for (i, _), foot, side in zip(rows[1:], feet, wanted, strict=True)
+        if foot not in ("", side) or first not in other
+    ]
+    if wrong:
+        raise GaitError(str(path), wrong)
+    return _read(table, cast(Side, first), str(path))
+
+
+def with_footsteps(gait: Gait, steps: Footsteps) -> Gait:
+    """The gait that steps onto listed footholds and is in all else as given.
+
+    Args:
+        gait: of kind ``preview`` or ``footsteps``: the waist of others follows key points, not the feet.
+        steps: from ``footsteps`` or ``load_footsteps``.
+
+    Raises:
+        GaitError: a gait of another kind.
+    """
+    if gait.kind == "geometric":
+        found = "a gait of kind 'geometric' moves its waist by key points, wherever the feet are"
+        fix = 'Give one of kind "preview" or "footsteps"'
+        raise GaitError(gait.path or f"gait {gait.name}", [Fault("[gait]", "kind", found, fix)])
+    document = gait.to_dict()
+    document["gait"] |= {"kind": "footsteps", "first": steps.first}
+    document["foothold"] = [{"x": place.x, "y": place.y, "yaw": place.yaw} for place in steps.places]
+    return gait_from_dict(document, gait.path)
+
+
+def _row(i: int, place: Any) -> dict[str, Any]:
+    try:
+        values = [float(value) for value in place]
+    except (TypeError, ValueError):
+        values = []
+    if len(values) != len(KEYS):
+        fix = "Expected (x, y, yaw), two lengths [m] and an angle [rad]"
+        raise GaitError("footsteps", [Fault(f"step {i + 1}", "", f"{place!r} is no foothold", fix)])
+    return dict(zip(KEYS, values, strict=True))
+
+
+def _read(rows: Sequence[dict[str, Any]], first: Side, where: str) -> Footsteps:
+    faults: list[Fault] = []
+    places = read_places(rows, {}, frozenset(), faults)
+    if not rows:
+        faults.append(Fault("steps", "", "none is listed", "Give one foothold at least"))
+    if faults:
+        raise GaitError(where, faults)
+    return Footsteps(places, first)
