@@ -40,6 +40,7 @@ from screwkin.servo.survey import (
 from screwkin.servo.wanted import Difference
 
 Port = Annotated[str, typer.Option(help="Serial port of the servos, as /dev/ttyUSB0.")]
+_SCANNED = 100  # answers that round trips are measured by
 Rs485 = Annotated[bool, typer.Option("--rs485", help="Let the kernel switch direction.")]
 
 
@@ -102,7 +103,7 @@ def _examined(
         mute = {one.id for one in apart if one.register in ("id", "status_level")}
         asked = [bounds.ids[k] for k in chosen if bounds.ids[k] not in mute]
         try:
-            return apart, measured(bus, asked, place.address, place.width) if asked else None
+            return apart, measured(bus, asked, place.address, place.width, _SCANNED) if asked else None
         except LineLostError:
             raise
         except BusError as error:

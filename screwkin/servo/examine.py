@@ -46,14 +46,20 @@ def servo_registers_differ(bus: Bus, bounds: Bounds, k: int, mend: str) -> Itera
     """
     name, id, profile = bounds.names[k], bounds.ids[k], bounds.profiles[k]
     power = "check its power, cable and id: screwkin bus scan --all"
+    needed = {row.register for row in wanted(bounds, k)} | set(mode_registers(profile)) | {"model_number"}
     try:
-        number = bus.read(id, profile.register("model_number").address, 2).value
+        try:
+            values = register_values(bus, profile, id, needed)
+        except RefusedError:  # another model may have no such registers
+            values = register_values(bus, profile, id, ["model_number"])
+        number = values["model_number"]
         if profile.verified and number != profile.number:
             model = f"{profile.number} ({profile.model})"
             yield Difference(name, id, "model_number", str(number), model, "mount that, or name its model")
-            return
-        needed = {row.register for row in wanted(bounds, k)} | set(mode_registers(profile))
-        yield from compared(bounds, k, register_values(bus, profile, id, needed), mend)
+        elif len(values) < len(needed):
+            yield Difference(name, id, "table", "cut short", f"a {profile.model}'s", power)
+        else:
+            yield from compared(bounds, k, values, mend)
     except LineLostError:
         raise
     except DamagedError:

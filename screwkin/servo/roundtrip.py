@@ -16,8 +16,8 @@ import numpy as np
 from screwkin.servo.bus import PATIENCE, Bus
 from screwkin.servo.line import BusError, LineLostError
 
-SAMPLES = 100
-"""Answers that round trips are measured by."""
+SAMPLES = 40
+"""Answers that round trips are measured by before a play: about two of each servo."""
 _LEAST = 0.008  # s: a computer that does something else for a moment is no servo that is silent
 _MARGIN = 0.004  # s
 _FACTOR = 1.5  # of what 99 % of the answers take
@@ -63,7 +63,7 @@ def round_trip(bus: Bus) -> RoundTrip | None:
     return RoundTrip(float(least), float(median), float(most), len(times))
 
 
-def measured(bus: Bus, ids: Sequence[int], address: int, length: int) -> RoundTrip:
+def measured(bus: Bus, ids: Sequence[int], address: int, length: int, count: int = SAMPLES) -> RoundTrip:
     """The round trips of a bus, of the recent answers and as many more as it takes.
 
     Args:
@@ -71,12 +71,13 @@ def measured(bus: Bus, ids: Sequence[int], address: int, length: int) -> RoundTr
         ids: of the servos to ask in turn.
         address: first byte of each servo's table that is read.
         length: number of bytes.
+        count: least number of answers.
 
     Raises:
         BusError: servos do not answer. LineLostError: the port is gone.
     """
     failed = 0
-    for k in range(SAMPLES - len(bus.statistics.recent)):
+    for k in range(count - len(bus.statistics.recent)):
         try:
             bus.read(ids[k % len(ids)], address, length)
         except LineLostError:
