@@ -281,6 +281,13 @@ def test_two_hands_carry_one_object_along_a_path(holding):
         stands = np.broadcast_to(sk.frame_pose(both, home, foot), (200, 4, 4))
         np.testing.assert_allclose(sk.frame_pose(both, closed.state, foot), stands, atol=1e-10)
 
+    # Squeezed by 5 N on the whole path, while the feet carry everything: both halves of Davies' method.
+    forces = sk.static_forces(mechanism, closed.state, imposed={"object.fy": 5.0}, weights=True)
+    assert forces.residual.max() < 1e-9
+    np.testing.assert_allclose(np.abs(forces["object.fy"]), 5.0)
+    feet = sum(forces.force(foot) for foot in ("right_foot", "left_foot"))
+    np.testing.assert_allclose(feet, np.broadcast_to([0, 0, both.mass * 9.81], (200, 3)), atol=1e-8)
+
 
 def test_an_elbow_keeps_its_distance_from_an_obstacle():
     """An arm of seven joints leads its hand along a line; left alone, its elbow would come too near."""
