@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from screwkin.analysis.validate import Validation, validate
+    from screwkin.compliance.commands import compensate
     from screwkin.dynamics.contact import ContactPatch
     from screwkin.dynamics.contact_forces import contact_forces
     from screwkin.dynamics.forward import forward_dynamics
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "analysis.validate": "Validation validate",
+    "compliance.commands": "compensate",
     "dynamics.contact": "ContactPatch",
     "dynamics.contact_forces": "contact_forces",
     "dynamics.forward": "forward_dynamics",
@@ -98,6 +100,7 @@ __all__ = [
     "close_loops",
     "closed_mechanism",
     "com_jacobian",
+    "compensate",
     "contact_forces",
     "fitting_gait",
     "footsteps",

@@ -18,7 +18,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.compliance.springs import StiffnessChoice
 from screwkin.errors import InputError
-from screwkin.gait.compensation import WAYS, compensate, way_of
+from screwkin.gait.compensation import WAYS, compensate_walk, way_of
 from screwkin.model.robot import Robot
 from screwkin.sim.compliant import STEP, Compliance, SpringServos
 from screwkin.sim.measure import ZmpRecord, zmp_record
@@ -28,7 +28,7 @@ from screwkin.trajectory import Trajectory
 
 Treatment = Literal["none", "swing", "joint", "dynamic"]
 TREATMENTS: tuple[Treatment, ...] = ("none", "swing", "joint", "dynamic")
-"""``none`` plays the plan itself, the others what ``compensate`` returns in one of its ``WAYS``."""
+"""``none`` plays the plan itself, the others what ``compensate_walk`` returns in one of its ``WAYS``."""
 
 Pair = tuple[float, float]
 
@@ -115,7 +115,7 @@ def compliance_study(
         One row per treatment.
 
     Raises:
-        MissingDependencyError: pybullet is not installed. Others as of ``compensate`` and
+        MissingDependencyError: pybullet is not installed. Others as of ``compensate_walk`` and
         ``SpringServos``.
     """
     if "compensation" in trajectory.meta:
@@ -129,7 +129,7 @@ def compliance_study(
         commanded = trajectory
         if treatment != "none":
             method, model = WAYS[treatment]
-            commanded = compensate(robot, trajectory, stiffness, method, passes, model)
+            commanded = compensate_walk(robot, trajectory, stiffness, method, passes, model)
 
         def so_far(share: float, done: int = done) -> None:
             if progress is not None:

@@ -21,7 +21,7 @@ from screwkin.algebra.se3 import as_array, rotation_from_array, rotation_log
 from screwkin.analysis.account import check_tips, closure_of
 from screwkin.dynamics.support import sole_corners
 from screwkin.gait.balance import Balance, zmp
-from screwkin.gait.compensation import compensate, stiffness_of, way_of
+from screwkin.gait.compensation import compensate_walk, stiffness_of, way_of
 from screwkin.gait.intended import intended
 from screwkin.model.robot import Robot
 from screwkin.trajectory import Trajectory, check_joints
@@ -145,7 +145,7 @@ def _command_faults(robot: Robot, trajectory: Trajectory, motion: Trajectory) ->
     entry = trajectory.meta["compensation"]
     choices = (entry[key] for key in ("method", "passes", "model"))
     losses = {name: entry.get(name) for name in ("damping", "armature")}
-    anew = compensate(robot, motion, stiffness_of(trajectory), *choices, **losses)
+    anew = compensate_walk(robot, motion, stiffness_of(trajectory), *choices, **losses)
     away = np.abs(anew.q - trajectory.q)
     if not away.max() <= SAME_COMMAND:
         k = int(away.max(axis=0).argmax())

@@ -9,7 +9,7 @@ from typing import Any, Literal, TypeVar
 
 from screwkin.compliance.springs import joint_stiffness
 from screwkin.errors import InputError, UnknownNameError
-from screwkin.gait.compensation import WAYS, compensate, stiffness_of, way_of
+from screwkin.gait.compensation import WAYS, compensate_walk, stiffness_of, way_of
 from screwkin.model.robot import Robot
 from screwkin.motors.library import motors_named, motors_of
 from screwkin.motors.records import Motor
@@ -94,7 +94,7 @@ class SimulatedCompliance:
             for what in ("stiffness", "damping", "armature")
         )
         method, model = WAYS["dynamic"]
-        return compensate(
+        return compensate_walk(
             robot, trajectory, stiffness, method, model=model, damping=damping, armature=armature
         )
 

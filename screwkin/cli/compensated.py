@@ -13,7 +13,7 @@ from screwkin.cli.output import aligned
 from screwkin.compliance.springs import joint_stiffness
 from screwkin.errors import InputError, one_of
 from screwkin.files import make_folder
-from screwkin.gait.compensation import WAYS, Remaining, Way, compensate, convergence
+from screwkin.gait.compensation import WAYS, Remaining, Way, compensate_walk, convergence
 from screwkin.model.robot import Robot
 from screwkin.trajectory import Trajectory
 
@@ -117,10 +117,10 @@ def compensated(
     """The commands, to be written into a folder of their own in ``folder``.
 
     Raises:
-        NoSolutionError, LimitError: such servos cannot be compensated. Others as of ``compensate``.
+        NoSolutionError, LimitError: such servos cannot be compensated. Others as of ``compensate_walk``.
     """
     method, model = WAYS[wanted.way]
-    commands = compensate(robot, trajectory, wanted.stiffness, method, wanted.passes, model)
+    commands = compensate_walk(robot, trajectory, wanted.stiffness, method, wanted.passes, model)
     commands = replace(commands, meta={**commands.meta, "command": command})
     rows: Sequence[Remaining] = ()
     if model != "dynamic":

@@ -59,7 +59,7 @@ WAYS: Mapping[Way, tuple[Method, Model]] = {
 """Method and model by name: the foot in the air, all joints by statics, all joints by the walk's torques."""
 
 
-def compensate(
+def compensate_walk(
     robot: Robot,
     trajectory: Trajectory,
     stiffness: StiffnessChoice = None,
@@ -141,8 +141,8 @@ def convergence(
 ) -> tuple[Remaining, ...]:
     """Remaining position error of the swing foot after every pass of a compensation; row 0 is without any.
 
-    Arguments and errors as of ``compensate``. The error is measured in single support: the position of the
-    other foot's tip in the nonlinear equilibrium, less the planned one, with the stance foot in place.
+    Arguments and errors as of ``compensate_walk``. The error is measured in single support: the position of
+    the other foot's tip in the nonlinear equilibrium, less the planned one, with the stance foot in place.
     """
     rows: list[Remaining] = []
     if model not in ("linear", "nonlinear"):

@@ -12,7 +12,7 @@ from screwkin.analysis.stiffness_maps import DeflectionMap, stiffness_maps
 from screwkin.analysis.workspace import WorkspaceMap, workspace
 from screwkin.compliance.stiffness import Method as Law
 from screwkin.errors import InputError, one_of
-from screwkin.gait.compensation import METHODS, compensate, convergence
+from screwkin.gait.compensation import METHODS, compensate_walk, convergence
 from screwkin.gait.footsteps import footholds
 from screwkin.gait.preview import follow_reference, preview_gains
 from screwkin.gait.preview_plan import zmp_reference
@@ -136,7 +136,7 @@ def compensated_of(bench: Bench, gait: str, stiffness: float) -> Trajectory:
     """The walk with commands whose swing foot is compensated."""
     account = bench.account(gait)
     key = ("compensated", account.trajectory.sha256, stiffness)
-    return bench.once(key, lambda: compensate(account.robot, account.trajectory, stiffness, "swing"))
+    return bench.once(key, lambda: compensate_walk(account.robot, account.trajectory, stiffness, "swing"))
 
 
 def compensation(

@@ -7,7 +7,7 @@ import pytest
 import screwkin as sk
 from screwkin.analysis.compliance import Conditions, Trial, compliance_study, summarised
 from screwkin.errors import InputError
-from screwkin.gait.compensation import compensate
+from screwkin.gait.compensation import compensate_walk
 from screwkin.sim.pybullet import Physics, PyBulletBackend
 from screwkin.sim.run import Schedule, simulate
 
@@ -91,7 +91,7 @@ def test_impossible_studies_are_refused(
 
 
 def test_a_walk_is_not_compensated_twice(robot: sk.Robot, gait: sk.Gait) -> None:
-    walked = compensate(robot, sk.walk(robot, gait, steps=1), 100.0)
+    walked = compensate_walk(robot, sk.walk(robot, gait, steps=1), 100.0)
     with pytest.raises(InputError, match="compensated already"):
         compliance_study(robot, walked, 100.0)
 

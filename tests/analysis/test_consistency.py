@@ -11,7 +11,7 @@ import pytest
 
 import screwkin as sk
 from screwkin.analysis.consistency import motion_faults
-from screwkin.gait.compensation import WAYS, compensate
+from screwkin.gait.compensation import WAYS, compensate_walk
 from screwkin.model.library import gait_names
 from screwkin.model.robot import Robot
 from screwkin.trajectory import Trajectory
@@ -45,7 +45,7 @@ def test_commands_for_elastic_servos_agree_with_their_motion(
     robot: Robot, walk: Trajectory, way: str
 ) -> None:
     method, model = WAYS[way]  # type: ignore[index]
-    commands = compensate(robot, walk, 60.0, method, model=model)
+    commands = compensate_walk(robot, walk, 60.0, method, model=model)
     assert motion_faults(robot, commands) == ()
     shifted = commands.q.copy()
     shifted[:, 3] += 0.01

@@ -13,7 +13,7 @@ from screwkin.analysis.validate import planned_facts
 from screwkin.analysis.verdict import bound_to, verdict_of
 from screwkin.compliance.springs import joint_stiffness
 from screwkin.errors import InputError, SafetyError, UnknownNameError
-from screwkin.gait.compensation import compensate, stiffness_of, way_of
+from screwkin.gait.compensation import compensate_walk, stiffness_of, way_of
 from screwkin.motors.library import load_motor, motor_text
 from screwkin.sim.compliant import Compliance
 from tests.verdicts import passing
@@ -47,7 +47,7 @@ def test_a_servo_file_that_changed_since_is_refused(verdict, fast, tmp_path):
     """The robot's table holds the name of such a file, not its figures; the verdict holds their hash."""
     file = tmp_path / "mine.toml"
     file.write_text(motor_text(load_motor("AX-12A")), encoding="utf-8")
-    commands = compensate(ROBOT, fast, model="dynamic")
+    commands = compensate_walk(ROBOT, fast, model="dynamic")
     own = replace(verdict, servo=str(file))
     data = verdict_of(ROBOT, commands, replace(own, **planned_facts(ROBOT, commands), warnings=())).to_dict()
     path = commands.save(tmp_path / "trajectory.npz")
@@ -97,7 +97,7 @@ def test_the_verdict_says_how_commands_allow_for_the_servos(verdict, fast):
 def test_a_stiffness_wrong_by_a_third_is_survived(fast, factor):
     pytest.importorskip("mujoco")
     k = factor * joint_stiffness(ROBOT)[0]
-    check = sk.validate(ROBOT, compensate(ROBOT, fast, k, model="dynamic"), "mujoco", servo="table")
+    check = sk.validate(ROBOT, compensate_walk(ROBOT, fast, k, model="dynamic"), "mujoco", servo="table")
     assert not check.fell
     assert check.max_tilt_deg < 1.43  # 25 mrad
 

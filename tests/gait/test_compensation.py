@@ -14,7 +14,7 @@ import screwkin as sk
 from screwkin.analysis.consistency import motion_faults
 from screwkin.compliance.stiffness import static_deflection
 from screwkin.errors import InputError, LimitError, NoSolutionError, UnknownNameError
-from screwkin.gait.compensation import compensate, convergence
+from screwkin.gait.compensation import compensate_walk, convergence
 from screwkin.gait.loads import load_distribution
 from screwkin.trajectory import load_trajectory
 
@@ -69,7 +69,7 @@ def test_one_pass_removes_nine_tenths_and_five_all_but_a_hundredth_of_a_millimet
     assert rows[5].norm_mm < 0.01
     assert all(b.norm_mm < 0.2 * a.norm_mm for a, b in pairwise(rows))
     for row in (rows[0], rows[1]):
-        commanded = compensate(robot, walked, K, method, passes=row.passes) if row.passes else walked
+        commanded = compensate_walk(robot, walked, K, method, passes=row.passes) if row.passes else walked
         assert row.norm_mm == pytest.approx(missed_mm(robot, walked, commanded), rel=1e-6)
 
 
@@ -85,20 +85,20 @@ def test_joints_told_to_lead_by_the_torques_of_the_intended_posture_come_to_rest
     robot: sk.Robot, walked: sk.Trajectory
 ) -> None:
     """The torque of a posture does not depend on how it is reached, so one linear pass is exact."""
-    commanded = compensate(robot, walked, K, "joint", model="linear")
+    commanded = compensate_walk(robot, walked, K, "joint", model="linear")
     for foot, _, rows in stances(walked):
         rest = at_rest(robot, commanded.q[rows], foot, walked.T_world_tip[foot][rows])
         np.testing.assert_allclose(rest.q, walked.q[rows], rtol=0, atol=1e-10)
         np.testing.assert_allclose(rest.T_world_base, walked.T_world_base[rows], rtol=0, atol=1e-9)
     alone = walked.contact.sum(axis=1) == 1
-    settled = compensate(robot, walked, K, "joint", passes=6)
+    settled = compensate_walk(robot, walked, K, "joint", passes=6)
     np.testing.assert_allclose(settled.q[alone], commanded.q[alone], rtol=0, atol=1e-8)
 
 
 def test_swing_moves_only_the_leg_in_the_air_and_keeps_its_sole_level(
     robot: sk.Robot, walked: sk.Trajectory
 ) -> None:
-    commanded = compensate(robot, walked, K, "swing")
+    commanded = compensate_walk(robot, walked, K, "swing")
     both = walked.contact.all(axis=1)
     assert np.array_equal(commanded.q[both], walked.q[both])
     state = sk.State(walked.T_world_base, commanded.q)
@@ -113,7 +113,7 @@ def test_swing_moves_only_the_leg_in_the_air_and_keeps_its_sole_level(
 
 
 def test_joint_commands_do_not_jump_where_feet_take_over(robot: sk.Robot, walked: sk.Trajectory) -> None:
-    joint, swing = (compensate(robot, walked, K, method).q - walked.q for method in ("joint", "swing"))
+    joint, swing = (compensate_walk(robot, walked, K, method).q - walked.q for method in ("joint", "swing"))
     jump = [np.abs(np.diff(change, axis=0)).max() / np.abs(change).max() for change in (joint, swing)]
     assert jump[0] < 0.25
     assert jump[1] > 0.5
@@ -122,7 +122,7 @@ def test_joint_commands_do_not_jump_where_feet_take_over(robot: sk.Robot, walked
 def test_only_commands_change_and_the_file_tells_how(
     robot: sk.Robot, walked: sk.Trajectory, tmp_path: Path
 ) -> None:
-    path = compensate(robot, walked, {"default": K, "left_knee": 80}, "swing", passes=2).save(
+    path = compensate_walk(robot, walked, {"default": K, "left_knee": 80}, "swing", passes=2).save(
         tmp_path / "c.npz"
     )
     commanded = load_trajectory(path)
@@ -138,38 +138,42 @@ def test_only_commands_change_and_the_file_tells_how(
 
 def test_rates_belong_to_the_commands(robot: sk.Robot, walked: sk.Trajectory) -> None:
     """Away from jumps the commanded rates are the differences of the commanded positions."""
-    commanded = compensate(robot, walked, K, "joint")
+    commanded = compensate_walk(robot, walked, K, "joint")
     change, rate = commanded.q - walked.q, commanded.qd - walked.qd
     slope = (change[2:] - change[:-2]) / (walked.time[2:] - walked.time[:-2])[:, None]
     assert np.abs(slope - rate[1:-1]).mean() < 0.05 * np.abs(rate).max()
 
 
 def test_commands_of_motors_add_what_back_emf_and_rotors_take(robot: sk.Robot, walked: sk.Trajectory) -> None:
-    spring = compensate(robot, walked, K, model="dynamic")
-    motor = compensate(robot, walked, K, model="dynamic", damping={"default": 0.3}, armature=0.005)
+    spring = compensate_walk(robot, walked, K, model="dynamic")
+    motor = compensate_walk(robot, walked, K, model="dynamic", damping={"default": 0.3}, armature=0.005)
     taken = 0.3 * walked.qd + 0.005 * walked.qdd
     np.testing.assert_allclose(K * (motor.q - spring.q), taken, rtol=0, atol=1e-12)
     assert set(motor.meta["compensation"]["damping"].values()) == {0.3}
     assert set(spring.meta["compensation"]["armature"].values()) == {0.0}
     assert motion_faults(robot, motor) == motion_faults(robot, spring) == ()
     with pytest.raises(InputError, match=r"damping of left_knee is -1\.0; it must be a number of at least 0"):
-        compensate(robot, walked, K, model="dynamic", damping={"default": 0.3, "left_knee": -1.0})
+        compensate_walk(robot, walked, K, model="dynamic", damping={"default": 0.3, "left_knee": -1.0})
     with pytest.raises(InputError, match="are of model 'dynamic', not of 'linear'"):
-        compensate(robot, walked, K, model="linear", damping=0.3)
+        compensate_walk(robot, walked, K, model="linear", damping=0.3)
 
 
 def test_a_servo_model_of_the_table_gives_its_motors_figures_unless_a_stiffness_is_given() -> None:
     """AX-12A: 2 N m/A through 16 ohm brake with 4 / 16 N m s/rad."""
     robot = sk.load_robot("bioloid")
     walked = sk.walk(robot, sk.load_gait("smooth"), steps=1)
-    of_table, spring = (compensate(robot, walked, k, model="dynamic").meta["compensation"] for k in (None, K))
+    of_table, spring = (
+        compensate_walk(robot, walked, k, model="dynamic").meta["compensation"] for k in (None, K)
+    )
     assert set(of_table["damping"].values()) == {0.25}
     assert set(of_table["armature"].values()) == {0.005}
     assert set(spring["damping"].values()) == {0.0}
 
 
 def test_a_hundred_times_stiffer_needs_a_hundredth(robot: sk.Robot, walked: sk.Trajectory) -> None:
-    soft, stiff = (compensate(robot, walked, k, "joint", model="linear").q - walked.q for k in (K, 100 * K))
+    soft, stiff = (
+        compensate_walk(robot, walked, k, "joint", model="linear").q - walked.q for k in (K, 100 * K)
+    )
     np.testing.assert_allclose(soft, 100 * stiff, rtol=0, atol=1e-12)
 
 
@@ -208,7 +212,7 @@ def test_wrong_choices_are_refused(
     robot: sk.Robot, walked: sk.Trajectory, choice: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(InputError, match=message):
-        compensate(robot, walked, **choice)
+        compensate_walk(robot, walked, **choice)
 
 
 def test_the_walks_own_torques_seek_no_static_equilibrium(robot: sk.Robot, walked: sk.Trajectory) -> None:
@@ -218,7 +222,7 @@ def test_the_walks_own_torques_seek_no_static_equilibrium(robot: sk.Robot, walke
 
 def test_what_cannot_be_compensated_is_told_with_its_time(robot: sk.Robot, walked: sk.Trajectory) -> None:
     with pytest.raises(NoSolutionError, match=r"t = 0\.000 s: standing on .*too soft"):
-        compensate(robot, walked, 0.5)
+        compensate_walk(robot, walked, 0.5)
     knee = robot.joint_names.index("left_knee")
     tight = [
         replace(j, upper=float(walked.q[:, knee].max()) + 1e-4) for j in robot.joints if j.name == "left_knee"
@@ -226,15 +230,15 @@ def test_what_cannot_be_compensated_is_told_with_its_time(robot: sk.Robot, walke
     narrow = replace(robot, joints=tuple(tight[0] if j.name == "left_knee" else j for j in robot.joints))
     for method in ("swing", "joint"):
         with pytest.raises(LimitError, match="left_knee"):
-            compensate(narrow, walked, K, method)
+            compensate_walk(narrow, walked, K, method)
 
 
 def test_trajectories_that_do_not_fit_are_refused(robot: sk.Robot, walked: sk.Trajectory) -> None:
     with pytest.raises(InputError, match="joints are not those of bioloid"):
-        compensate(sk.load_robot("bioloid"), walked, K)
+        compensate_walk(sk.load_robot("bioloid"), walked, K)
     flying = walked.contact.copy()
     flying[60] = False
     with pytest.raises(InputError, match=r"t = 1\.200 s: no foot is in contact"):
-        compensate(robot, replace(walked, contact=flying), K)
+        compensate_walk(robot, replace(walked, contact=flying), K)
     with pytest.raises(UnknownNameError, match="elbow"):
-        compensate(robot, walked, {"elbow": 3.0, "default": K})
+        compensate_walk(robot, walked, {"elbow": 3.0, "default": K})

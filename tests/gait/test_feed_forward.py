@@ -9,7 +9,7 @@ import pytest
 
 import screwkin as sk
 from screwkin.compliance.stiffness import static_deflection
-from screwkin.gait.compensation import compensate
+from screwkin.gait.compensation import compensate_walk
 from screwkin.gait.feed_forward import walking_torques
 from screwkin.gait.loads import load_distribution
 
@@ -63,6 +63,6 @@ def test_standing_on_both_feet_neither_ankle_works_against_the_other(
 
 
 def test_commands_lead_by_the_torque_over_the_stiffness(robot: sk.Robot, walked: sk.Trajectory) -> None:
-    told = compensate(robot, walked, 80.0, "joint", model="dynamic")
+    told = compensate_walk(robot, walked, 80.0, "joint", model="dynamic")
     np.testing.assert_allclose(80.0 * (told.q - walked.q), walking_torques(robot, walked), atol=1e-12)
     assert told.meta["compensation"]["model"] == "dynamic"

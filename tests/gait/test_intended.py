@@ -9,7 +9,7 @@ import pytest
 
 import screwkin as sk
 from screwkin.errors import UnreachableError
-from screwkin.gait.compensation import WAYS, compensate
+from screwkin.gait.compensation import WAYS, compensate_walk
 from screwkin.gait.intended import intended
 
 
@@ -19,7 +19,7 @@ def test_what_compensation_did_to_the_joints_is_undone(robot: str, gait: str, wa
     table = sk.load_robot(robot)
     walked = sk.walk(table, sk.load_gait(gait).replace(rate=25), steps=1)
     method, model = WAYS[way]  # type: ignore[index]
-    told = compensate(table, walked, 60.0, method, 1, model)
+    told = compensate_walk(table, walked, 60.0, method, 1, model)
     assert np.abs(told.q - walked.q).max() > 1e-3
     found = intended(table, told)
     np.testing.assert_allclose(found.q, walked.q, rtol=0, atol=1e-9)
