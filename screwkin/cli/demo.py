@@ -16,7 +16,8 @@ from screwkin.analysis.validate import Validation
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder
 from screwkin.cli.output import aligned, print_json, remark, silent
-from screwkin.cli.send import played, virtual_bus
+from screwkin.cli.playing import played
+from screwkin.cli.send import virtual_bus
 from screwkin.cli.simulation import Wish, simulate_to_files
 from screwkin.cli.walk import chosen_gait, command_of, make_trajectory, write_report
 from screwkin.errors import MissingDependencyError, SafetyError

@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-import signal
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
-from types import FrameType
 from typing import Annotated, Any
 
 import typer
 
-from screwkin.analysis.readiness import Ready, ready
+from screwkin.analysis.readiness import ready
 from screwkin.cli.folder import output_folder
 from screwkin.cli.injected import Faults, FormerFaults, Seed, injected_faults
 from screwkin.cli.options import AsJson, OutputFolder, TrajectoryPath
-from screwkin.cli.output import print_json, progress_bar, remark
+from screwkin.cli.output import print_json, remark
+from screwkin.cli.playing import log_of, played, played_on_port
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.model.robot import Robot
 from screwkin.servo.budget import ADAPTER, budget
-from screwkin.servo.bus import Bus, open_line
+from screwkin.servo.bus import Bus
 from screwkin.servo.frames import Frames
 from screwkin.servo.gate import Bounds
+from screwkin.servo.guarded import Place
 from screwkin.servo.leave import EndState
-from screwkin.servo.player import Player, PlayOutcome, PlaySettings, describe
+from screwkin.servo.player import PlayOutcome, PlaySettings, describe
 from screwkin.servo.servo_map import ServoMap
 from screwkin.servo.virtual.bus import SimulatedClock, VirtualBus
 from screwkin.servo.virtual.faults import InjectedFault
@@ -61,7 +60,8 @@ def send(
     """Play a validated trajectory to the servos: a dry run that opens nothing, unless --go.
 
     Writes play.npz, a log of commands and measurements. With --virtual all is done in simulated time. Exit
-    code 4 where the trajectory is refused, or a fault stopped it; 130 where it was interrupted.
+    code 4 where the trajectory is refused, a fault stopped it, or a servo did not confirm how it was left;
+    130 where it was interrupted.
     """
     if port and virtual:
         raise InputError("--port and --virtual are two buses; choose one")
@@ -96,41 +96,14 @@ def send(
         _print_dry(trajectory, frames, bounds, facts, as_json)
         return 0
     with output_folder(output, "send", may.robot.name) as folder:
-        bus = _real_bus(servos, port, rs485) if port else virtual_bus(may.robot, faults, seed)
-        outcome = played(bus, may, settings, folder / "play.npz", {"port": port or "virtual"})
-    return _print_outcome(outcome, facts | {"log": str(folder / "play.npz")}, bounds, as_json)
-
-
-def played(bus: Bus, may: Ready, settings: PlaySettings, log: Path, facts: Mapping[str, Any]) -> PlayOutcome:
-    """Play on a bus, close it, and save the log whatever happens once the servos move.
-
-    Args:
-        bus: open.
-        may: what to play.
-        settings: how.
-        log: path of its file.
-        facts: what its ``meta`` holds besides.
-    """
-    meta = {
-        "robot": may.robot.name,
-        "trajectory_sha256": may.trajectory.sha256,
-        "rate": settings.rate,
-        **facts,
-    }
-    with _stop_on_signal() as stopped, progress_bar("playing") as done:
-        player = Player(bus, may.robot, settings, stopped, done)
-        try:
-            outcome = player.play(may.trajectory)
-            meta |= outcome.to_dict()
-            return outcome
-        finally:
-            bus.close()
-            if player.log.frames or "faults" in meta:
-                player.log.save(log, meta)
-
-
-def _real_bus(servos: ServoMap, port: str, rs485: bool) -> Bus:
-    return Bus(open_line(port, servos.baud, rs485), servos.protocol, servos.baud)
+        log = folder / "play.npz"
+        if port:
+            place = Place(port, servos.baud, rs485, servos.protocol)
+            outcome = played_on_port(may, settings, log, place)
+        else:
+            outcome = played(virtual_bus(may.robot, faults, seed), may, settings, log, {"port": "virtual"})
+        facts["log"] = str(log_of(log))
+    return _print_outcome(outcome, facts, bounds, as_json)
 
 
 def virtual_bus(robot: Robot, faults: Sequence[InjectedFault] = (), seed: int = 0) -> Bus:
@@ -139,22 +112,6 @@ def virtual_bus(robot: Robot, faults: Sequence[InjectedFault] = (), seed: int = 
     mounted = virtual_servos(robot, return_delay=_RETURN_DELAY)
     line = VirtualBus(mounted, clock, servos.baud, faults, seed, adapter=ADAPTER)
     return Bus(line, servos.protocol, servos.baud, clock, opener=line.reopened)
-
-
-@contextmanager
-def _stop_on_signal() -> Iterator[Any]:
-    """Yields a function that says whether Ctrl-C or a wish to end has come, instead of an exception."""
-    asked: list[int] = []
-
-    def ask(number: int, frame: FrameType | None) -> None:
-        asked.append(number)
-
-    before = {number: signal.signal(number, ask) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield lambda: bool(asked)
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def _print_dry(path: Path, frames: Frames, bounds: Bounds, facts: dict[str, Any], as_json: bool) -> None:
@@ -182,12 +139,13 @@ def _print_outcome(outcome: PlayOutcome, facts: dict[str, Any], bounds: Bounds, 
             f"{outcome.frames} frames sent, {outcome.late_frames} late; largest tracking error "
             f"{outcome.max_tracking_error:.3f} rad; log in {facts['log']}"
         )
-    if not outcome.faults:
+    if outcome.well:
         if not as_json:
             remark(message)
         return 0
     remark(f"error: {message}")
-    return _INTERRUPTED if outcome.faults[0].kind == "interrupted" else _REFUSED
+    kinds = [fault.kind for fault in outcome.faults]
+    return _INTERRUPTED if kinds == ["interrupted"] and outcome.known else _REFUSED
 
 
 def _state(text: str) -> EndState:

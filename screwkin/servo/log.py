@@ -1,88 +1,201 @@
-"""What a play on servos leaves behind: commands and measurements frame by frame, in one npz file.
+"""What a play on servos leaves behind: commands and measurements frame by frame.
 
-Its file holds: ``time`` (F,) planned and ``sent`` (F,) true time of every frame [s] from the start of the
-play, ``trajectory_time`` (F,) [s] (NaN before and after the trajectory), ``joint_names``, ``ids`` (n,),
-``command`` (F, n) [rad], ``position`` (F, n) [rad], ``speed`` [rad/s], ``load`` [share of the greatest
-torque], ``voltage`` [V], ``temperature`` [degrees Celsius], ``read_at`` [s] when that was answered, each
-(F, n), NaN where a servo was not read in that frame, and ``meta``, JSON text.
+While it plays, records are appended to ``play.jsonl``, each one line of JSON, so that whatever ends the play,
+all is there but the last frame: ``{"play": 1, "joint_names": [...], "ids": [...], "meta": {...}}``, and then
+in the order in which it happened ``["frame", time, sent, trajectory_time, [command of every joint]]`` and
+``["read", joint, read_at, position, speed, load, voltage, temperature]``, ``null`` for what is not known. A
+last line without its end is left out.
+
+At the end of a play ``play.npz`` takes its place: ``time`` (F,) planned and ``sent`` (F,) true time of every
+frame [s] from the start of the play, ``trajectory_time`` (F,) [s] (NaN before and after the trajectory),
+``joint_names``, ``ids`` (n,), ``command`` (F, n) [rad], ``position`` (F, n) [rad], ``speed`` [rad/s],
+``load`` [share of the greatest torque], ``voltage`` [V], ``temperature`` [degrees Celsius], ``read_at`` [s]
+when that was answered, each (F, n), NaN where a servo was not read in that frame, and ``meta``, JSON text.
 """
 
 from __future__ import annotations
 
+import errno
 import json
+import math
+import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
-from screwkin.errors import InputError
+from screwkin.errors import InputError, OutputError
 from screwkin.files import atomic_write_bytes, npz_bytes, read_file, read_json, read_npz
 
-MEASURED = ("position", "speed", "load", "voltage", "temperature", "read_at")
-_GROWTH = 2
+MEASURED = ("position", "speed", "load", "voltage", "temperature")
+JOURNAL = ".jsonl"
+"""Suffix of the log of a play that goes on."""
+
+_FORMAT = 1
+_EVERY = 0.05  # s, after which measurements are written even within a frame
+_ROOM = 400  # bytes of disk for a joint in a frame, in both files
 
 
 class Log:
-    """Frames of n joints as they are played."""
+    """Frames of n joints as they are played.
 
-    def __init__(self, names: Sequence[str], ids: Sequence[int], frames: int = 1024) -> None:
+    Args:
+        names: of the joints.
+        ids: of their servos.
+        file: unbuffered, what is appended to; by default memory.
+        meta: what is known before the play.
+
+    Raises:
+        OutputError: nothing can be written. What goes wrong later stands in ``failure``: a log that fails is
+            no reason to leave servos alone.
+    """
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        ids: Sequence[int],
+        file: BinaryIO | None = None,
+        meta: Mapping[str, Any] | None = None,
+    ) -> None:
         self.names, self.ids, self.frames = tuple(names), tuple(ids), 0
-        n = len(self.names)
-        self._times = np.full((frames, 3), np.nan)
-        self._command = np.full((frames, n), np.nan)
-        self._measured = {name: np.full((frames, n), np.nan) for name in MEASURED}
+        self.failure: OutputError | None = None
+        self._file: BinaryIO = file or BytesIO()
+        self._pending: list[str] = []
+        self._written = -math.inf
+        head = {"play": _FORMAT, "joint_names": self.names, "ids": self.ids, "meta": dict(meta or {})}
+        self._pending.append(json.dumps(head))
+        self.flush()
+        if self.failure is not None:
+            raise self.failure
 
     def frame(self, time: float, sent: float, trajectory_time: float, command: Array) -> None:
         """Begin a frame: when it was due, when it was sent [s], and what was commanded (n,) [rad]."""
-        if self.frames == len(self._times):
-            self._grow()
-        self._times[self.frames] = time, sent, trajectory_time
-        self._command[self.frames] = command
+        at = float(trajectory_time) if math.isfinite(trajectory_time) else None
+        self._pending.append(json.dumps(["frame", float(time), float(sent), at, command.tolist()]))
         self.frames += 1
 
     def measured(self, joint: int, values: Mapping[str, float], time: float) -> None:
-        """What a servo answered at a time [s] in the frame begun last; ``values`` has all the rest."""
-        for name, value in {**values, "read_at": time}.items():
-            if name in self._measured:
-                self._measured[name][self.frames - 1, joint] = value
+        """What a servo answered at a time [s] in the frame begun last."""
+        known = (float(values.get(name, math.nan)) for name in MEASURED)
+        row = [None if math.isnan(value) else value for value in known]
+        self._pending.append(json.dumps(["read", int(joint), float(time), *row]))
+        if time - self._written > _EVERY:
+            self.flush(time)
+
+    def flush(self, time: float = -math.inf) -> None:
+        """Write what has been gathered, at a time [s]; once that fails, nothing is written any more."""
+        data = "".join(f"{line}\n" for line in self._pending).encode()
+        self._pending.clear()
+        self._written = time
+        if self.failure is not None:
+            return
+        try:
+            while data:
+                count = self._file.write(data)
+                if not count:
+                    raise OSError(errno.EIO, "nothing was written")
+                data = data[count:]
+        except OSError as error:
+            self.failure = OutputError(f"the log cannot be written: {error.strerror or error}")
 
     def arrays(self, meta: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
-        """The fields as they stand in the file."""
-        count = self.frames
-        times = dict(zip(("time", "sent", "trajectory_time"), self._times[:count].T, strict=True))
-        return {
-            **times,
-            "joint_names": np.array(self.names, dtype=np.str_),
-            "ids": np.array(self.ids, dtype=np.int64),
-            "command": self._command[:count],
-            **{name: column[:count] for name, column in self._measured.items()},
-            "meta": np.array(json.dumps(meta)),
-        }
+        """The fields as they stand in the npz file; ``meta`` adds to what was known before."""
+        self.flush()
+        self._file.seek(0)
+        return _arrays(self._file.read(), meta)
 
     def save(self, path: str | Path, meta: Mapping[str, Any]) -> Path:
-        """Write the file beside, then rename it: it is whole or not there.
+        """Write the npz file beside, then rename it: it is whole or not there.
 
         Raises:
             OutputError: it cannot be written.
         """
-        path = Path(path)
-        data = npz_bytes(self.arrays(meta))
-        with atomic_write_bytes(path) as file:
-            file.write(data)
-        return path
+        return _save(path, self.arrays(meta))
 
-    def _grow(self) -> None:
-        def grown(column: Array) -> Array:
-            more = np.full((_GROWTH * len(column), *column.shape[1:]), np.nan)
-            more[: len(column)] = column
-            return more
 
-        self._times, self._command = grown(self._times), grown(self._command)
-        self._measured = {name: grown(column) for name, column in self._measured.items()}
+def check_room(folder: Path, frames: int, joints: int) -> None:
+    """Refuse a play whose log the disk cannot take.
+
+    Raises:
+        OutputError: says what is free and what is needed.
+    """
+    needed, free = _ROOM * frames * joints, shutil.disk_usage(folder).free
+    if needed > free:
+        raise OutputError(
+            f"the log needs {needed / 1e6:.1f} MB in {folder}, where {free / 1e6:.1f} MB are free"
+        )
+
+
+def close_journal(path: Path, meta: Mapping[str, Any]) -> Path:
+    """Put ``play.npz`` in the place of a ``play.jsonl``, as at the end of a play.
+
+    Args:
+        path: of the journal.
+        meta: what it does not yet say, as how the play ended.
+
+    Raises:
+        InputError: it holds no play. OutputError: the npz file cannot be written; the journal stays.
+    """
+    saved = _save(path.with_suffix(".npz"), _arrays(read_file(path), meta))
+    path.unlink(missing_ok=True)
+    return saved
+
+
+def _save(path: str | Path, arrays: Mapping[str, NDArray[Any]]) -> Path:
+    path = Path(path)
+    data = npz_bytes(arrays)
+    with atomic_write_bytes(path) as file:
+        file.write(data)
+    return path
+
+
+def _arrays(data: bytes, meta: Mapping[str, Any]) -> dict[str, NDArray[Any]]:
+    """The fields of an npz file from the lines of a journal.
+
+    Raises:
+        InputError: they are no play, or damaged before the last.
+    """
+    whole, _, _ = data.rpartition(b"\n")
+    records = [_record(line, i) for i, line in enumerate(whole.split(b"\n"))]
+    head = records[0]
+    if not isinstance(head, dict) or head.get("play") != _FORMAT:
+        raise InputError("it does not begin as the log of a play does")
+    try:
+        frames = [record for record in records[1:] if record[0] == "frame"]
+        n = len(head["joint_names"])
+        measured = np.full((len(MEASURED) + 1, len(frames), n), np.nan)
+        i = -1
+        for record in records[1:]:
+            if record[0] == "frame":
+                i += 1
+            else:
+                measured[:, max(i, 0), record[1]] = record[2:]
+        times = np.array([record[1:4] for record in frames], dtype=float).reshape(-1, 3)
+        command = np.array([record[4] for record in frames], dtype=float).reshape(-1, n)
+        known = dict(head["meta"])
+        names, ids = np.array(head["joint_names"], dtype=np.str_), np.array(head["ids"], dtype=np.int64)
+    except (LookupError, TypeError, ValueError) as error:
+        raise InputError(f"a record that no play writes ({error}); the log is damaged") from None
+    return {
+        **dict(zip(("time", "sent", "trajectory_time"), times.T, strict=True)),
+        "joint_names": names,
+        "ids": ids,
+        "command": command,
+        **dict(zip(("read_at", *MEASURED), measured, strict=True)),
+        "meta": np.array(json.dumps(known | dict(meta))),
+    }
+
+
+def _record(line: bytes, i: int) -> Any:
+    try:
+        return json.loads(line)
+    except ValueError:
+        raise InputError(f"line {i + 1} is no JSON; the log is damaged") from None
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,14 +237,15 @@ _SHAPES = {
 
 
 def load_log(path: str | Path) -> PlayLog:
-    """The record of a ``play.npz``.
+    """The record of a ``play.npz``, or of the ``play.jsonl`` of a play that nobody brought to its end.
 
     Raises:
         InputError: not there, truncated, damaged, or no log of a play.
     """
     path = Path(path)
     try:
-        arrays = read_npz(read_file(path))
+        data = read_file(path)
+        arrays = _arrays(data, {}) if path.suffix == JOURNAL else read_npz(data)
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     except InputError as error:

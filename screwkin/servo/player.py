@@ -22,12 +22,15 @@ from screwkin.servo.bus import Bus
 from screwkin.servo.examine import mending, servo_registers_differ
 from screwkin.servo.frames import Frames, approach, frames_of, run_out
 from screwkin.servo.gate import Bounds, Gate
+from screwkin.servo.guarded import Guard, NoGuard
 from screwkin.servo.leave import EndState, Final, leave
 from screwkin.servo.line import BusError, LineLostError, Reply
 from screwkin.servo.log import Log
 from screwkin.servo.reading import Readings
-from screwkin.servo.watch import PlayStopped, ServoFault, Thresholds, Watch
+from screwkin.servo.watch import FaultKind, PlayStopped, ServoFault, Thresholds, Watch
 from screwkin.trajectory import Trajectory
+
+_SLACK = 0.1  # s, beyond what a late frame may be late, after which a player hangs
 
 
 @dataclass(frozen=True)
@@ -63,6 +66,16 @@ class PlayOutcome:
     final: Final
     log: Log
 
+    @property
+    def known(self) -> bool:
+        """Whether every servo confirmed how it was left."""
+        return self.final.state != "unknown" and not self.final.unconfirmed
+
+    @property
+    def well(self) -> bool:
+        """Whether it was played to its end, and the servos are in a known state."""
+        return self.known and not self.faults
+
     def to_dict(self) -> dict[str, Any]:
         """As JSON data, without the log's arrays."""
         return {
@@ -84,6 +97,8 @@ class Player:
         settings: how to play.
         stop: asked in every frame whether to come to rest early.
         progress: called with the share of the trajectory that was played.
+        log: of the robot's joints; by default in memory.
+        guard: who takes over where the player cannot go on; nobody for servos that end with this process.
     """
 
     def __init__(
@@ -93,23 +108,28 @@ class Player:
         settings: PlaySettings | None = None,
         stop: Callable[[], bool] = lambda: False,
         progress: Callable[[float], None] = lambda share: None,
+        log: Log | None = None,
+        guard: Guard | None = None,
     ) -> None:
         self.bus, self.robot, self.settings = bus, robot, settings or PlaySettings()
         self.bounds = Bounds.of(robot, torque=self.settings.torque)
         self.gate = Gate(bus, self.bounds)
         self.readings = Readings(bus, self.bounds)
         self.watch = Watch(self.bounds, self.settings.thresholds)
-        self.log = Log(self.bounds.names, self.bounds.ids)
+        self.log = log or Log(self.bounds.names, self.bounds.ids)
+        self.guard: Guard = guard or NoGuard()
         self._stop, self._progress = stop, progress
         self._frames = self._late = 0
         self._began = bus.clock.now()
         self._due = 0.0
+        self._resting = False
 
     def play(self, trajectory: Trajectory) -> PlayOutcome:
         """Play the trajectory, and leave the servos as the settings say.
 
         Raises:
-            SafetyError: beyond limits, or the servos are not in a state to begin; nothing has moved.
+            SafetyError: beyond limits, the servos are not in a state to begin, or there is no guardian:
+                nothing has moved. KeyboardInterrupt: it was to stop before anything had moved.
             InputError: more frames per second than the bus carries. Any other exception is passed on after
                 the servos were brought into the state for faults.
         """
@@ -122,11 +142,14 @@ class Player:
         retries, patience = self.bus.retries, self.bus.patience
         pose = self.ready_pose(frames.q[0])
         self.readings.plan(frames.rate, self.settings.thresholds.interval)
+        if self._stop():
+            raise KeyboardInterrupt
         fault: ServoFault | None = None
         final = Final("unknown", self.bounds.names)
         state, finished = self.settings.on_fault, False
+        self.bus.retries = 0  # in a play nobody waits: a lost reply is asked for again in the next frame
+        self._arm()
         try:
-            self.bus.retries = 0  # in a play nobody waits: a lost reply is asked for again in the next frame
             self._run(frames, pose)
             state, finished = self.settings.at_end, True
         except PlayStopped as stopped:
@@ -141,6 +164,8 @@ class Player:
             self.bus.retries = 1
             final = self._leave(state, finished)
             self.bus.retries, self.bus.patience = retries, patience
+            final = self._known(final)
+            self.log.flush(self._time())
         faults = (fault,) if fault else ()
         return PlayOutcome(self._frames, self._late, self.watch.max_tracking_error, faults, final, self.log)
 
@@ -185,6 +210,19 @@ class Player:
             return leave(self.gate, self.bus, state, finished)
         return final
 
+    def _arm(self) -> None:
+        """From now on somebody else leaves the servos as announced, should this process not do it."""
+        silence = 1.0 / self.settings.rate + self.settings.thresholds.late + _SLACK
+        self.guard.arm(self.bounds, self.settings.on_fault, self.bus.patience, silence)
+
+    def _known(self, final: Final) -> Final:
+        """The state the servos are in; where nobody answers, the guardian tries on a port opened anew."""
+        if final.state != "unknown":
+            self.guard.dismiss()
+            return final
+        self.bus.close()
+        return self.guard.take_over() or final
+
     def _run(self, frames: Frames, pose: Array) -> None:
         start = self.bounds.within(pose)
         self.gate.torque_limit()
@@ -205,8 +243,8 @@ class Player:
         for i, goal in enumerate(q):
             if (wait := self._due - clock.now()) > 0:
                 clock.sleep(wait)
-            if self._stop():
-                self._come_to_rest(q, i)
+            if not self._resting and (kind := self._reason_to_stop()) is not None:
+                self._come_to_rest(q, i, *kind)
             late = clock.now() - self._due
             self.gate.goals(goal, period)
             self._frames += 1
@@ -220,14 +258,25 @@ class Player:
             self.watch.frame(goal, late, self._time())
             self._due += period
             self._read(goal)
+            self.log.flush(self._time())
             if times is not None:
                 self._progress((i + 1) / len(q))
 
-    def _come_to_rest(self, q: Array, i: int) -> None:
+    def _reason_to_stop(self) -> tuple[FaultKind, str] | None:
+        """Why the play should end in order, if it should."""
+        if self._stop():
+            return "interrupted", "stopped by the user"
+        if self.log.failure is not None:
+            return "log", str(self.log.failure)
+        if self.guard.lost:
+            return "guardian", "the guardian has gone: nobody would take over, should this program die"
+        return None
+
+    def _come_to_rest(self, q: Array, i: int, kind: FaultKind, why: str) -> None:
         """Run on ever more slowly for a moment, then stop."""
-        self._stop = lambda: False
+        self._resting = True
         self._stream(run_out(q, i, self.settings.stop, self.settings.rate), None)
-        raise PlayStopped(ServoFault("interrupted", "", -1, self._time(), "stopped by the user"))
+        raise PlayStopped(ServoFault(kind, "", -1, self._time(), why))
 
     def _read(self, goal: Array) -> None:
         def taken(k: int, reply: Reply) -> None:

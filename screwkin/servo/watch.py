@@ -26,6 +26,8 @@ FaultKind = Literal[
     "line",
     "late",
     "gate",
+    "log",
+    "guardian",
     "interrupted",
 ]
 _HEALTH: frozenset[ErrorBit] = frozenset(("voltage", "overheat", "overload", "hardware"))

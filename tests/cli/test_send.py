@@ -2,23 +2,32 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import signal
 import threading
 from collections.abc import Callable
+from contextlib import contextmanager
 from dataclasses import replace
+from io import FileIO
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from screwkin.cli import run
+from screwkin.errors import OutputError
 from screwkin.files import read_npz
 from screwkin.model.table import load_robot
+from screwkin.servo.gate import Gate
+from screwkin.servo.leave import leave
 from screwkin.servo.line import MonotonicClock
 from screwkin.servo.log import load_log
+from screwkin.servo.player import Player
 from screwkin.servo.virtual.bus import VirtualBus
+from screwkin.servo.virtual.faults import InjectedFault
 from screwkin.servo.virtual.robot import virtual_servos
 from screwkin.servo.virtual.terminal import PseudoTerminal
 from screwkin.trajectory import load_trajectory
@@ -229,3 +238,112 @@ def test_ctrl_c_brings_the_servos_to_rest_and_leaves_a_log(cli, passed, tmp_path
     assert called.data["state"] == "limp"
     assert {servo.get("torque_enable") for servo in bus.servos} == {0}
     assert (tmp_path / "out" / "play.npz").exists()
+
+
+@pytest.mark.parametrize("state", ["hold", "limp"])
+@pytest.mark.parametrize(("id", "left"), [(11, "17 of 18 servos"), (None, "The servos do not answer")])
+def test_a_play_whose_servos_do_not_confirm_how_they_are_left_is_no_success(
+    cli, passed, tmp_path, monkeypatch, id, left, state
+):
+    """Their answers are lost once all frames were sent: no fault, and yet not exit code 0."""
+
+    def leaving(gate, bus, *words):
+        bus.line.inject(InjectedFault("dropped", bus.clock.now(), id=id))
+        return leave(gate, bus, *words)
+
+    monkeypatch.setattr("screwkin.servo.player.leave", leaving)
+    words = ["--virtual", "--go", "--at-end", state, "-o", tmp_path / "out", "--json"]
+    called = cli("send", passed, *words)
+    assert called.data["faults"] == []
+    assert called.code == 4
+    assert f"error: played to its end. {left}" in called.err
+    assert "Switch their power off" in called.err
+    assert called.data["state"] == (state if id else "unknown")
+    assert called.data["unconfirmed"]
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a system without a full device")
+def test_a_log_on_a_full_disk_refuses_the_play(cli, refused, passed, tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "play.jsonl").symlink_to("/dev/full")
+    told = refused(cli("send", passed, "--virtual", "--go", "-o", tmp_path / "out"), 2)
+    assert "the log cannot be written: No space left on device" in told
+
+
+def test_a_disk_without_room_for_the_log_refuses_the_play(cli, refused, passed, tmp_path, monkeypatch):
+    monkeypatch.setattr("shutil.disk_usage", lambda folder: SimpleNamespace(free=1000))
+    told = refused(cli("send", passed, "--virtual", "--go", "-o", tmp_path / "out"), 2)
+    assert "where 0.0 MB are free" in told
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_log_that_fails_in_mid_play_stops_it_in_order_and_stays_readable(
+    cli, passed, tmp_path, monkeypatch
+):
+    """The disk is full after 100 kB, and for the npz file too."""
+
+    class Filling(FileIO):
+        def write(self, data):
+            if self.tell() > 100_000:
+                raise OSError(errno.ENOSPC, "No space left on device")
+            return super().write(data)
+
+    @contextmanager
+    def appended(path):
+        with Filling(path, "w+b") as file:
+            yield file
+
+    def full(path, data):
+        raise OutputError(f"cannot write {path}: No space left on device")
+
+    monkeypatch.setattr("screwkin.cli.playing._appended", appended)
+    monkeypatch.setattr("screwkin.servo.log._save", full)
+    words = ["--virtual", "--go", "--on-fault", "limp", "-o", tmp_path / "out", "--json"]
+    called = cli("send", passed, *words)
+    assert called.code == 4
+    [fault] = called.data["faults"]
+    assert fault["kind"] == "log"
+    assert "the log cannot be written: No space left on device. All 18 servos are limp." in called.err
+    assert called.data["log"] == str(tmp_path / "out" / "play.jsonl")
+    log = load_log(called.data["log"])
+    assert fault["time"] - log.time[-1] == pytest.approx(0.4, abs=0.05), "it ran out on its path"
+
+
+def test_a_wish_to_stop_before_anything_moved_moves_nothing(cli, passed, tmp_path, monkeypatch):
+    written = []
+    monkeypatch.setattr("screwkin.servo.gate.Gate._write", lambda *words: written.append(words))
+    asking = Player.ready_pose
+
+    def interrupted(player, first):
+        os.kill(os.getpid(), signal.SIGINT)
+        return asking(player, first)
+
+    monkeypatch.setattr(Player, "ready_pose", interrupted)
+    assert cli("send", passed, "--virtual", "--go", "-o", tmp_path / "out").code == 130
+    assert written == []
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT"])
+def test_signals_that_ask_for_the_end_act_alike(cli, passed, tmp_path, monkeypatch, name):
+    if not hasattr(signal, name):
+        pytest.skip("a system without this signal")
+    sending, count = Gate.goals, iter(range(10_000))
+
+    def goals(gate, q, dt):
+        if next(count) == 80:
+            os.kill(os.getpid(), getattr(signal, name))
+        return sending(gate, q, dt)
+
+    monkeypatch.setattr(Gate, "goals", goals)
+    called = cli("send", passed, "--virtual", "--go", "-o", tmp_path / "out", "--json")
+    assert (called.code, [fault["kind"] for fault in called.data["faults"]]) == (130, ["interrupted"])
+    assert called.data["frames"] == 81 + 20
+    assert called.data["state"] == "hold"
+
+
+def test_a_system_without_a_guardian_says_so_before_the_play(cli, passed, tmp_path, monkeypatch):
+    monkeypatch.setattr("screwkin.cli.playing.no_guardian", lambda: "it has no processes")
+    called = cli("send", passed, "--port", "/dev/none", "--go", "-o", tmp_path / "out")
+    assert called.code == 2
+    assert "warning: no guardian (it has no processes): should this program die" in called.err
