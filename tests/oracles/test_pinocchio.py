@@ -6,7 +6,7 @@ Its base velocity is [v; omega] in base axes, ours [omega; v] in world axes; bot
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -116,3 +116,13 @@ def test_inverse_dynamics_agree(case: Case) -> None:
     for k, q, P in case.states():
         tau = pin.rnea(case.model, case.data, q, P @ case.velocity(k), P @ case.acceleration(k))
         assert_agree(ours[k], P.T @ tau)
+
+
+def test_forward_dynamics_agree(case: Case) -> None:
+    s, n = case.sample, len(case.robot.joints)
+    force = np.random.default_rng(4).uniform(-1, 1, (len(s.qd), 6 + n))
+    ours = sk.forward_dynamics(case.robot, s.state, s.qd, force[:, 6:], s.base_twist, force[:, :6])
+    for k, q, P in case.states():
+        theirs = pin.aba(case.model, case.data, q, P @ case.velocity(k), np.linalg.solve(P.T, force[k]))
+        found = replace(case, sample=replace(s, base_acceleration=ours[:, :6], qdd=ours[:, 6:]))
+        assert_agree(P @ found.acceleration(k), theirs)
