@@ -42,6 +42,11 @@ def is_jax(x: object) -> bool:
     return jax is not None and isinstance(x, jax.Array)
 
 
+def is_traced(x: object) -> bool:
+    """True for JAX tracers: arrays without values, at which no code can look."""
+    return is_jax(x) and isinstance(x, sys.modules["jax"].core.Tracer)
+
+
 def namespace(*scalars: Scalar) -> Any:
     """The functions that fit the most demanding of the scalars: symbols, graph, JAX, NumPy, then floats."""
     arrays = False

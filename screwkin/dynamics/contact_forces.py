@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.algebra.scalar import is_jax
+from screwkin.algebra.scalar import is_jax, is_traced
 from screwkin.algebra.se3 import as_array
 from screwkin.dynamics.contact import ContactPatch, contact_distribution, contact_points, standing
 from screwkin.dynamics.friction import Grip, limited, pyramids
@@ -122,9 +122,9 @@ def contact_forces(
     by_tip = _weights(robot, chosen, weights)
     wished = _wished(robot, chosen, internal)
     shares: Any = contact_distribution(robot, state, weights=by_tip, internal=wished, **motion)
-    if not any(is_jax(x) for x in (shares["wrenches"], by_tip)):
-        _refuse_unsupported(chosen, by_tip, shares["spread"][..., 0], robot)
-    elif rough:
+    if not is_traced(shares["spread"]):
+        _refuse_unsupported(chosen, np.asarray(by_tip), shares["spread"][..., 0], robot)
+    if rough and is_jax(shares["wrenches"]):
         raise InputError("contact_forces computes friction of NumPy arrays; leave it out, or give these")
     if rough:
         inside = _inside(robot, state, chosen, by_tip, shares["wrenches"])
@@ -181,7 +181,7 @@ def _weights(robot: Robot, patches: Sequence[ContactPatch], weights: Sequence[An
     columns: list[Any] = [np.zeros(())] * len(robot.limbs)
     for patch, weight in zip(patches, weights, strict=True):
         column = weight if is_jax(weight) else np.asarray(weight, dtype=float)
-        if not is_jax(column) and not (column >= 0).all():
+        if not is_traced(column) and not (np.asarray(column) >= 0).all():
             raise InputError(f"a weight of {patch.tip} is negative or NaN; give flags or numbers from 0 on")
         columns[robot.tip_names.index(patch.tip)] = column
     if any(map(is_jax, columns)):

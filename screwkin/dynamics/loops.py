@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from screwkin.algebra.linear import Orthogonal, definite, product
-from screwkin.algebra.scalar import Scalar, is_jax, plus, times
+from screwkin.algebra.scalar import Scalar, is_traced, plus, times
 from screwkin.algebra.screws import at
 from screwkin.algebra.se3 import (
     IDENTITY,
@@ -241,13 +241,8 @@ def refuse_loops(robot: Robot, state: State) -> None:
     Raises:
         InputError: a closure is open. SingularError: joints that drive do not determine those that follow.
     """
-    if not robot.closures or robot.is_symbolic:
+    if not robot.closures or robot.is_symbolic or is_traced(state.q):
         return
-    if is_jax(state.q):
-        import jax
-
-        if isinstance(state.q, jax.core.Tracer):
-            return
     mechanism, q = loops_of(robot), np.asarray(state.q, dtype=float)
     q = q.reshape(-1, q.shape[-1])
     columns = dict(zip(robot.joint_names, unstack(q), strict=True))

@@ -310,6 +310,8 @@ def test_traced_arrays_give_traced_forces():
             return sk.contact_forces(robot, sk.State(T, q), rest, rest, [patch]).wrenches
 
         np.testing.assert_allclose(np.asarray(jax.jit(traced)(q)), plain.wrenches, atol=1e-11)
+        with pytest.raises(NoSolutionError, match="nothing is in contact"):
+            sk.contact_forces(robot, sk.State(T, q), rest, rest, {patch: 0.0})
         rough = replace(patch, friction=0.5)
         with pytest.raises(InputError, match="friction of NumPy arrays"):
             sk.contact_forces(robot, sk.State(T, q), rest, rest, [rough])
