@@ -61,7 +61,7 @@ def test_actions_and_motions_of_linkages_are_dual(name):
 
 
 @given(seed=seeds, count=loops, planar=st.booleans())
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=5, deadline=None)
 def test_actions_and_motions_of_random_mechanisms_are_dual(seed, count, planar):
     """Planar ones are overconstrained: three redundant constraints for every loop."""
     assert_dual(random_loops(seed, count, planar=planar))
@@ -69,7 +69,7 @@ def test_actions_and_motions_of_random_mechanisms_are_dual(seed, count, planar):
 
 
 @given(seed=seeds, count=loops)
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=4, deadline=None)
 def test_a_coupling_transmits_the_wrenches_reciprocal_to_its_screw(seed, count):
     mechanism = sk.closed_mechanism(random_loops(seed, count))
     home, system = sk.home(mechanism.robot), every_effort(mechanism)
@@ -126,7 +126,7 @@ def test_a_choice_of_primary_actions_is_checked_with_advice(primary, error, mess
 
 
 @given(seed=seeds, count=st.integers(1, 2), data=st.data())
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=4, deadline=None)
 def test_what_the_advice_says_is_accepted(seed, count, data):
     """Any choice that leaves independent secondary actions passes; the check agrees with LAPACK."""
     mechanism = sk.closed_mechanism(random_loops(seed, count))

@@ -23,7 +23,7 @@ def four_bar():
 
 
 @given(seed=seeds, loops=st.integers(1, 3), draw=st.integers(0, 10**6))
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=4, deadline=None)
 def test_motors_supply_what_friction_takes(seed, loops, draw):
     """Random mechanisms, dampers at every joint, efforts imposed: N q' = 0, and power in is power out."""
     robot = random_loops(seed, loops)

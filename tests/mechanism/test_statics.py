@@ -105,7 +105,7 @@ def test_the_weights_of_the_four_bar_load_the_crank():
 
 
 @given(seed=seeds, loops=st.integers(1, 4), draw=st.integers(0, 10**6))
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=5, deadline=None)
 def test_every_link_of_a_random_mechanism_is_in_equilibrium(seed, loops, draw):
     """Loads and weights anywhere: Newton's laws on each link, virtual power on every motion."""
     robot = random_loops(seed, loops)
@@ -135,7 +135,7 @@ def test_every_link_of_a_random_mechanism_is_in_equilibrium(seed, loops, draw):
 
 
 @given(seed=seeds)
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=5, deadline=None)
 def test_open_arms_need_the_efforts_of_inverse_dynamics_at_rest(seed):
     robot = random_tree(seed, 7, True, "fixed")
     state = random_state(robot, seed, (3,))
@@ -234,6 +234,7 @@ def test_a_robot_in_the_air_is_refused():
         sk.static_forces(sk.closed_mechanism(robot), sk.home(robot), weights=True, contacts=[])
 
 
+@pytest.mark.slow
 def test_jax_states_have_jax_forces_with_derivatives():
     import jax
 
