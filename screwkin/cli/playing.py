@@ -36,7 +36,7 @@ def played_on_port(may: Ready, settings: PlaySettings, log: Path, place: Place) 
     line = open_line(place.port, place.baud, place.rs485)
     if not why:
         guard = Guardian(place, log.with_suffix(JOURNAL))
-    bus = Bus(GuardedLine(line, guard), place.protocol, place.baud)
+    bus = Bus(GuardedLine(line, guard), place.protocol, place.baud, port=place.port)
     return played(bus, may, settings, log, {"port": place.port}, guard)
 
 

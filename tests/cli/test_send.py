@@ -347,3 +347,15 @@ def test_a_system_without_a_guardian_says_so_before_the_play(cli, passed, tmp_pa
     called = cli("send", passed, "--port", "/dev/none", "--go", "-o", tmp_path / "out")
     assert called.code == 2
     assert "warning: no guardian (it has no processes): should this program die" in called.err
+
+
+@pytest.mark.realtime
+def test_a_servo_in_wheel_mode_is_refused_with_the_command_for_this_very_port(refused, cli, passed, tmp_path):
+    servos = virtual_servos(load_robot("bioloid"))
+    knee = next(servo for servo in servos if servo.id == 13)
+    knee.put("angle_limit_high", 0)
+    with PseudoTerminal(VirtualBus(servos, MonotonicClock())) as terminal:
+        told = refused(cli("send", passed, "--port", terminal.path, "--go", "-o", tmp_path / "out"), 4)
+    assert "right_knee (servo 13): angle_limit_high is 0 (wheel mode)" in told
+    assert f"screwkin bus configure bioloid --port {terminal.path} --go" in told
+    assert not any(servo.torque_on for servo in servos)
