@@ -11,6 +11,9 @@ from typing import Any, TypeVar, overload
 
 T = TypeVar("T")
 
+LONGEST_NAME = 200
+"""Characters of a name from which it is compared with no other: that takes the product of their lengths."""
+
 
 class ScrewkinError(Exception):
     """Base of all errors raised on purpose; ``exit_code`` is what the command line returns for it."""
@@ -167,7 +170,7 @@ class SafetyError(ScrewkinError):
 
 def near(name: str, valid: Iterable[str]) -> str:
     """A question for the nearest valid name, with a blank behind it: ``Did you mean 'knee'?``; or nothing."""
-    close = difflib.get_close_matches(str(name), list(valid), n=1)
+    close = difflib.get_close_matches(str(name), list(valid), n=1) if len(str(name)) < LONGEST_NAME else ()
     return f"Did you mean {close[0]!r}? " if close else ""
 
 

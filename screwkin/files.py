@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import math
 import re
 import secrets
 import tempfile
@@ -25,6 +26,14 @@ from screwkin.errors import InputError, OutputError, ScrewkinError
 _DATE = (1980, 1, 1, 0, 0, 0)  # the earliest a zip can tell; a true one would change the bytes
 LARGEST = 2**28
 """Bytes that a file may unpack to; an hour of walking at 50 Hz takes about as many."""
+LARGEST_TEXT = 2**22
+"""Bytes of a text: tables of robots take some thousand, those of public robots at most some 100,000."""
+LARGEST_RECORD = 2**24
+"""Bytes of a text that holds a measurement."""
+MOST_NAMES = 500
+"""Links, joints or rows of one kind that a file may have; a humanoid with its fingers has a hundred."""
+MOST_SHAPES = 5000
+"""Shapes of a robot's bodies; meshes that were divided into convex ones have some hundred."""
 DEEPEST = 64
 """Levels to which the JSON of a file may be nested; a walk's own data have seven."""
 _DAMAGE = (zipfile.BadZipFile, zlib.error, EOFError, KeyError, tokenize.TokenError)
@@ -117,51 +126,94 @@ def read_npz(data: bytes) -> dict[str, NDArray[Any]]:
         raise InputError("not an npz file, or a truncated one; make it again")
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            unpacked = sum(member.file_size for member in archive.infolist())
-        if unpacked > LARGEST:
-            raise InputError(
-                f"it unpacks to {unpacked / 1e6:.0f} MB, more than the {LARGEST / 1e6:.0f} MB that are read; "
-                "split the motion, or take fewer samples per second"
-            )
-        with np.load(io.BytesIO(data), allow_pickle=False) as archive:
-            arrays = {name: archive[name] for name in archive.files}
+            _check_sizes(archive)
+        with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+            return {name: arrays[name] for name in arrays.files}
     except InputError:
         raise
     except (ValueError, SyntaxError) as error:
-        pickled = "allow_pickle" in str(error)
-        found = "it holds pickled objects, which are never read" if pickled else f"damaged: {error}"
-        raise InputError(f"not a plain npz file; {found}") from None
+        raise InputError(f"not a plain npz file; damaged: {error}") from None
     except (*_DAMAGE, OSError, MemoryError, RuntimeError, TypeError) as error:
         raise InputError(f"a damaged npz file; make it again ({error})") from None
-    foreign = [name for name, array in arrays.items() if not isinstance(array, np.ndarray)]
+
+
+def _check_sizes(archive: zipfile.ZipFile) -> None:
+    """Refuse what unpacks to too much, by what the archive and the headers of its arrays say."""
+    members = archive.infolist()
+    if len(members) > MOST_NAMES:
+        raise InputError(f"it holds {len(members):,} arrays, at most {MOST_NAMES} are read")
+    foreign = [member.filename for member in members if not member.filename.endswith(".npy")]
     if foreign:
         raise InputError(f"it holds files that are no arrays: {', '.join(foreign)}")
-    return arrays
+    unpacked = 0
+    for member in members:
+        shape, dtype = _header(archive, member)
+        numbers = math.prod(shape)
+        if dtype.hasobject:
+            raise InputError("not a plain npz file; it holds pickled objects, which are never read")
+        if dtype.kind not in "cfiubUS" or (dtype.kind in "US" and numbers > MOST_NAMES):
+            found = f"{numbers:,} values of type {dtype}"
+            raise InputError(
+                f"{member.filename} holds {found}; expected numbers, or {MOST_NAMES} texts at most"
+            )
+        # Small integers become floats of eight bytes.
+        unpacked += max(numbers * max(dtype.itemsize, 8), member.file_size)
+    if unpacked > LARGEST:
+        raise InputError(
+            f"it unpacks to {unpacked / 1e6:.0f} MB, more than the {LARGEST / 1e6:.0f} MB that are read; "
+            "split the motion, or take fewer samples per second"
+        )
 
 
-def read_file(path: str | Path) -> bytes:
+def _header(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> tuple[tuple[int, ...], np.dtype[Any]]:
+    """Shape and type of an array, without its values."""
+    with archive.open(member) as file:
+        version = np.lib.format.read_magic(file)
+        if version not in ((1, 0), (2, 0)):
+            raise ValueError(f"{member.filename} has version {version} of the format")
+        read = (
+            np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        )
+        shape, _, dtype = read(file)
+    if min(shape, default=0) < 0:
+        raise ValueError(f"{member.filename} has shape {shape}")
+    return shape, dtype
+
+
+def read_file(path: str | Path, largest: int | None = None) -> bytes:
     """All bytes of a file.
 
+    Args:
+        path: of the file; a device or a pipe is read up to the limit.
+        largest: bytes that are read at most; default: ``LARGEST``.
+
     Raises:
-        OSError: it cannot be read. InputError: it holds more than ``LARGEST`` bytes.
+        OSError: it cannot be read. InputError: it holds more.
     """
+    limit = LARGEST if largest is None else largest
     with Path(path).open("rb") as file:
-        data = file.read(LARGEST + 1)
-    if len(data) > LARGEST:
-        raise InputError(f"more than the {LARGEST / 1e6:.0f} MB that are read; it is no file of screwkin")
+        data = file.read(limit + 1)
+    if len(data) > limit:
+        raise InputError(f"{size_fault(limit)}; it is no file of screwkin")
     return data
+
+
+def size_fault(largest: int) -> str:
+    """What is wrong with a file that holds more than so many bytes."""
+    return f"more than the {largest / 1e6:.0f} MB that are read"
 
 
 def read_json(text: str) -> Any:
     """The JSON data of a text that came from a file.
 
     Raises:
-        InputError: no JSON, or nested deeper than ``DEEPEST``.
+        InputError: no JSON, longer than ``LARGEST_RECORD``, or nested deeper than ``DEEPEST``.
     """
-    depth = deepest = 0
-    for bracket in re.findall(r'"(?:[^"\\]|\\.)*"|[\[\]{}]', text, re.DOTALL):
-        depth += (bracket in "[{") - (bracket in "]}")
-        deepest = max(deepest, depth)
+    if len(text) > LARGEST_RECORD:
+        raise InputError(f"JSON of {size_fault(LARGEST_RECORD)}")
+    brackets = re.sub(r'"(?:[^"\\]|\\.)*+"?|[^\[\]{}"]++', "", text, flags=re.DOTALL).encode()
+    opened = np.isin(np.frombuffer(brackets, np.uint8), list(b"[{"))
+    deepest = int(np.cumsum(np.where(opened, 1, -1), dtype=np.int32).max(initial=0))
     if deepest > DEEPEST:
         raise InputError(f"JSON nested {deepest:,} deep, at most {DEEPEST} are read")
     try:

@@ -39,6 +39,8 @@ from screwkin.model.robot import Robot
 TIP_PREFIX = "T_world_"
 LONGEST = 3600.0
 """Duration of a trajectory [s]; a simulation holds every step of it in memory."""
+LONGEST_GAP = 10.0
+"""Time between two samples [s]: so the steps of a simulation are in proportion to the samples, too."""
 _SHAPES: Mapping[str, tuple[str, ...]] = {
     "time": ("T",),
     "q": ("T", "n"),
@@ -333,16 +335,18 @@ def _json_data(meta: Any, faults: list[str]) -> Mapping[str, Any]:
 def _inconsistencies(trajectory: Trajectory) -> list[str]:
     """Faults that show only between well-formed fields."""
     faults = []
+    time, steps = trajectory.time, np.diff(trajectory.time)
     if trajectory.samples < 2:
         faults.append(f"time has {trajectory.samples} samples, expected at least 2")
-    elif np.min(np.diff(trajectory.time)) <= 0:
-        row = int(np.argmax(np.diff(trajectory.time) <= 0)) + 1
-        faults.append(f"time does not increase at sample {row} ({trajectory.time[row]:g} s)")
-    if trajectory.samples and trajectory.duration > LONGEST:
-        faults.append(
-            f"time goes from {trajectory.time[0]:g} to {trajectory.time[-1]:g} s; at most {LONGEST:g} s are "
-            "one motion, so play it in parts"
-        )
+    elif steps.min() <= 0:
+        row = int(np.argmax(steps <= 0)) + 1
+        faults.append(f"time does not increase at sample {row} ({time[row]:g} s)")
+    elif trajectory.duration > LONGEST:
+        whole = f"time goes from {time[0]:g} to {time[-1]:g} s"
+        faults.append(f"{whole}; at most {LONGEST:g} s are one motion, so play it in parts")
+    elif steps.max() > LONGEST_GAP:
+        gap = f"{steps.max():g} s lie between samples {steps.argmax()} and {steps.argmax() + 1}"
+        faults.append(f"{gap}, at most {LONGEST_GAP:g} s; give samples of a rest, too")
     unknown = [foot for foot in trajectory.feet if foot not in trajectory.T_world_tip]
     if unknown:
         faults.append(f"feet names {', '.join(unknown)}, without {TIP_PREFIX}{unknown[0]}")

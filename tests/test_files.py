@@ -121,3 +121,25 @@ def test_a_file_without_end_is_not_read_to_its_end(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(files, "LARGEST", 10**6)
     with pytest.raises(InputError, match="more than the 1 MB"):
         read_file("/dev/zero")
+
+
+@pytest.mark.parametrize(
+    ("descr", "shape", "found"),
+    [
+        ("<f8", (2**20, 2**20), "it unpacks to 8796093 MB"),
+        ("|i1", (2**26,), "it unpacks to 537 MB"),  # as floats
+        ("<f8", (-1,), "has shape"),
+        ("<U1", (501,), "501 values of type <U1; expected numbers, or 500 texts"),
+        ("|V8", (2,), "expected numbers"),
+        ("|O", (2,), "pickled objects"),
+    ],
+)
+def test_what_the_header_of_an_array_claims_is_judged_before_its_values_are_read(
+    descr: str, shape: tuple[int, ...], found: str
+) -> None:
+    text = repr({"descr": descr, "fortran_order": False, "shape": shape}).encode() + b"\n"
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as archive:
+        archive.writestr("q.npy", b"\x93NUMPY\x01\x00" + len(text).to_bytes(2, "little") + text)
+    with pytest.raises(InputError, match=found):
+        read_npz(out.getvalue())

@@ -280,3 +280,14 @@ def test_joints_must_be_those_of_the_robot_in_its_order() -> None:
     ):
         with pytest.raises(InputError, match=f"the log's joints are not those of poppy12: ({reason})"):
             check_joints(robot, given, "the log")
+
+
+def test_memory_is_in_proportion_to_the_samples_not_to_the_clock() -> None:
+    """Simulators and players hold every step between two samples."""
+    walk = a_walk()
+    time = np.array(walk.time)
+    time[5:] += 9.9
+    assert replace(walk, time=time).samples == walk.samples
+    time[5:] += 0.2
+    with pytest.raises(TrajectoryError, match=r"s lie between samples 4 and 5, at most 10 s"):
+        replace(walk, time=time)

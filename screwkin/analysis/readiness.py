@@ -20,7 +20,7 @@ from screwkin.analysis.frame_deviation import frame_deviation
 from screwkin.analysis.validate import planned_facts
 from screwkin.analysis.verdict import Criteria, Verdict, bound_to, contradictions, verdict_from_json
 from screwkin.errors import InputError, SafetyError, ScrewkinError, TrajectoryError, UnknownNameError
-from screwkin.files import read_file, text_sha256
+from screwkin.files import LARGEST_TEXT, read_file, text_sha256
 from screwkin.kinematics.limits import limited_joints
 from screwkin.model.records import LIMIT_TOLERANCE
 from screwkin.model.robot import Robot, robot_text
@@ -176,7 +176,7 @@ def _passed(path: Path, sha256: str) -> Verdict:
     beside = path.parent / VERDICT
     do = f"Run: screwkin validate {path}"
     try:
-        verdict = verdict_from_json(read_file(beside).decode())
+        verdict = verdict_from_json(read_file(beside, LARGEST_TEXT).decode())
     except FileNotFoundError:
         raise SafetyError(f"{path} was never validated: there is no {beside}. {do}") from None
     except (OSError, UnicodeError) as error:

@@ -23,6 +23,7 @@ from typing import cast
 
 from screwkin.algebra.se3 import IDENTITY, Pose
 from screwkin.errors import Fault, TableError, near
+from screwkin.files import MOST_NAMES
 from screwkin.model.dh import CONVENTIONS, Convention, DHRow, DHTable, DHType, row_transform
 from screwkin.model.dh_derive import fixed_rows
 from screwkin.model.expression import listed
@@ -74,6 +75,9 @@ def parse_dh(text: str, path: str = "<text>") -> tuple[DHTable, ...]:
         fix = "Begin with a header: convention,joint,alpha_deg,a_mm,d_mm,offset_deg"
         raise TableError(path, [Fault("file", "", "is empty", fix)])
     (number, header), *body = lines
+    if (longest := max(len(body), len(header))) > MOST_NAMES:
+        found = f"holds {longest:,} rows or columns, at most {MOST_NAMES} are read"
+        raise TableError(path, [Fault("file", "", found, "Give the table of one robot")])
     faults = list(_header_faults(f"line {number}", header))
     if faults:
         raise TableError(path, faults)

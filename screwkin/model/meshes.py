@@ -1,4 +1,4 @@
-"""Meshes from files, by trimesh: STL, OBJ, COLLADA and whatever else it reads."""
+"""Meshes from files, by trimesh: STL, OBJ, COLLADA and others."""
 
 from __future__ import annotations
 
@@ -14,8 +14,12 @@ from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
 from screwkin.errors import InputError, MissingDependencyError, needed_for
-from screwkin.files import read_file
+from screwkin.files import MOST_SHAPES, read_file
 
+LARGEST_MESH = 2**26
+"""Bytes of a mesh; public robots' have some million."""
+KINDS = ("stl", "obj", "dae", "ply", "off", "glb")
+"""Suffixes of the formats that are read; archives are not."""
 _UPRIGHT = {
     "X": np.array([[0.0, -1, 0], [0, 0, -1], [1, 0, 0]]),
     "Y": np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]]),
@@ -82,11 +86,15 @@ def _read(file: str, changed: int, size: int) -> Mesh:
     with needed_for("Reading meshes"):
         import trimesh
     kind = Path(file).suffix.lower().lstrip(".")
+    if kind not in KINDS:
+        raise InputError(f"mesh {file}: cannot be read (.{kind}; convert it to one of {', '.join(KINDS)})")
     if kind == "dae":
         with needed_for("Reading COLLADA"):
             import collada  # noqa: F401
     try:
-        data = read_file(file)
+        data = read_file(file, LARGEST_MESH)
+        if kind == "obj" and (parts := data.count(b"usemtl")) > MOST_SHAPES:
+            raise InputError(f"{parts:,} changes of material, at most {MOST_SHAPES:,} are read")
         scene: Any = trimesh.load_scene(BytesIO(data), file_type=kind, process=False)
         vertices, faces, colours = _parts_of(scene)
     except MissingDependencyError:

@@ -20,6 +20,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import pose_from_array
 from screwkin.errors import Fault, TableError, needed_for
 from screwkin.model.mesh_files import find_mesh
+from screwkin.model.mjcf_size import check_size
 from screwkin.model.records import Posture
 from screwkin.model.robot import Robot
 from screwkin.model.toml_out import robot_toml, rpy_of
@@ -29,13 +30,21 @@ _FREE, _BALL, _SLIDE, _HINGE = range(4)  # mjtJoint
 _GEOMS: Mapping[int, str] = {2: "sphere", 3: "capsule", 5: "cylinder", 6: "box", 7: "mesh"}  # mjtGeom
 _FLAT = 2  # mjtBuiltin
 _JOINT_EQUALITY = 2  # mjtEq
+_NAME = re.compile(r"\s*([A-Za-z_][^\s/>]*)")
 _MOTIONLESS = 1e-12  # coefficients of a coupling that count as none
 
 
 def is_mjcf(text: str) -> bool:
     """Whether an XML text is MJCF, by its first element."""
-    first = re.search(r"<\s*([A-Za-z_][^\s/>]*)", re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL))
-    return first is not None and first[1] == "mujoco"
+    at = -1
+    while (at := text.find("<", at + 1)) >= 0:
+        if text.startswith("<!--", at):
+            at = text.find("-->", at)
+            if at < 0:
+                return False
+        elif first := _NAME.match(text, at + 1):
+            return first[1] == "mujoco"
+    return False
 
 
 def parse_mjcf(text: str, path: str = "<text>", repair: bool = False) -> UrdfRobot:
@@ -47,11 +56,13 @@ def parse_mjcf(text: str, path: str = "<text>", repair: bool = False) -> UrdfRob
         repair: as of ``parse_urdf``.
 
     Raises:
-        TableError: MuJoCo cannot compile it, or it has joints or bodies that no table can hold.
+        TableError: MuJoCo cannot compile it, it asks for too much memory, or it has joints or bodies that
+            no table can hold.
         MissingDependencyError: mujoco is absent.
     """
     with needed_for("Reading MJCF"):
         import mujoco
+    check_size(text, path)
     folder, notes = Path(path).parent, dict[str, list[str]]()
     try:
         whole = Path(path).is_file()

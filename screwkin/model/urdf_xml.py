@@ -12,6 +12,7 @@ from typing import Any
 from screwkin.algebra.scalar import structural
 from screwkin.algebra.se3 import Pose, Vector, X, Y, Z, rotate
 from screwkin.errors import Fault, TableError
+from screwkin.files import LARGEST_TEXT, MOST_NAMES, MOST_SHAPES, size_fault
 from screwkin.model.records import JointType
 
 Element = Any
@@ -85,6 +86,8 @@ def read_root(text: str, path: str) -> Element:
     def refused(found: str, fix: str) -> TableError:
         return TableError(path, [Fault("file", "", found, fix)])
 
+    if len(text) > LARGEST_TEXT:
+        raise refused(f"holds {size_fault(LARGEST_TEXT)}", "Leave out what is no part of the robot")
     bare = _DECLARATION.sub("", text.strip("\ufeff\0 \t\r\n"), count=1)
     try:
         root = fromstring(bare.encode())
@@ -100,6 +103,12 @@ def read_root(text: str, path: str) -> Element:
     _drop_namespace(root)
     if root.tag != "robot":
         raise refused(f"begins with <{root.tag}>", _FOREIGN.get(root.tag, _FIX))
+    counts = {f"<{tag}>": (len(root.findall(tag)), MOST_NAMES) for tag in ("link", "joint")}
+    counts["<geometry>"] = sum(1 for _ in root.iter("geometry")), MOST_SHAPES
+    for tag, (count, most) in counts.items():
+        if count > most:
+            found = f"holds {count:,} elements {tag}, at most {most:,} are read"
+            raise refused(found, "Give the robot alone, or a part of it")
     return root
 
 

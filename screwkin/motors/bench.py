@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,6 +11,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.errors import InputError
+from screwkin.files import LARGEST_RECORD, read_file, read_json
 from screwkin.motors.pendulum import STEP, Pendulum, delayed, swing
 from screwkin.motors.records import Motor
 
@@ -49,10 +49,10 @@ def load_bench_log(path: str | Path) -> BenchLog:
     """
     path = Path(path)
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = read_json(read_file(path, LARGEST_RECORD).decode("utf-8"))
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:  # InputError is one, and UnicodeError
         raise InputError(f"{path} is no JSON file: {error}") from None
     entries = data.get("entries") if isinstance(data, dict) else None
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):

@@ -21,7 +21,6 @@ from __future__ import annotations
 
 import json
 import math
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, asdict, fields, replace
 from functools import cache
@@ -33,6 +32,7 @@ from typing import Any
 from screwkin.errors import Fault, InputError, TableError, UnknownNameError
 from screwkin.files import text_sha256
 from screwkin.model.robot import Robot
+from screwkin.model.toml import read_text, read_toml
 from screwkin.motors.records import Friction, Motor, MotorModel
 
 POSITIVE = ("constant", "resistance", "voltage", "gain", "kp", "max_duty", "max_current", "speed", "shape")
@@ -78,15 +78,12 @@ def model_table(path: str, folder: Path | None = None) -> tuple[Mapping[str, Any
         folder: where a relative path begins, besides the working folder.
 
     Raises:
-        UnknownNameError: there is no such file. InputError: it cannot be read, or is no TOML.
+        UnknownNameError: there is no such file. TableError: it cannot be read, or is no TOML.
     """
     name = path.strip()
     for place in (Path(name), *([folder / name] if folder else [])):
         if place.is_file():
-            try:
-                return _toml(place.read_bytes(), str(place)), str(place)
-            except OSError as error:
-                raise InputError(f"cannot read {place}: {error.strerror}") from None
+            return _toml(read_text(place, TableError), str(place)), str(place)
     raise UnknownNameError("servo model file", name, motor_models())
 
 
@@ -95,7 +92,7 @@ def bundled_tables() -> tuple[tuple[Mapping[str, Any], str], ...]:
     """What every bundled model's file holds, and its name, in order of the alphabet."""
     folder = files("screwkin.motors") / "models"
     names = sorted(entry.name for entry in folder.iterdir() if entry.name.endswith(".toml"))
-    return tuple((_toml((folder / name).read_bytes(), name), name) for name in names)
+    return tuple((_toml((folder / name).read_text("utf-8"), name), name) for name in names)
 
 
 def motors_of(robot: Robot) -> tuple[Motor, ...]:
@@ -200,11 +197,8 @@ def _with_supply(motor: Motor, servos: Mapping[str, Any]) -> Motor:
     return replace(motor, **given)
 
 
-def _toml(data: bytes, where: str) -> Mapping[str, Any]:
-    try:
-        return MappingProxyType(tomllib.loads(data.decode("utf-8")))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{where} is no TOML file: {error}") from None
+def _toml(text: str, where: str) -> Mapping[str, Any]:
+    return MappingProxyType(read_toml(text, where, TableError))
 
 
 def _model(table: Mapping[str, Any], where: str) -> MotorModel:

@@ -8,7 +8,6 @@ there are any ``with`` (the measure's arguments), ``paper`` (the printed value),
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -17,9 +16,9 @@ from typing import Annotated, Any
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
-from screwkin.errors import Fault, FileFaults, InputError
+from screwkin.errors import Fault, FileFaults
 from screwkin.model.library import find_paper
-from screwkin.model.toml import read_text
+from screwkin.model.toml import read_text, read_toml
 
 Value = float | int | str | Sequence[float] | None
 
@@ -106,10 +105,7 @@ def load_paper(name_or_path: str | Path) -> Paper:
 
 def parse_paper(text: str, path: str = "<text>") -> Paper:
     """The paper that a text describes; see ``load_paper``."""
-    try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: no valid TOML: {error}") from None
+    data = read_toml(text, path, FileFaults)
     head = data.get("paper")
     if not isinstance(head, dict):
         raise FileFaults(path, [Fault("[paper]", "", "no table", "Write its keys")])

@@ -165,7 +165,7 @@ def test_values_are_written_for_people(value, form, text):
         ('title = "two masses"', "", FileFaults, "section 1, key title: missing"),
         ('place = "Table 9"', 'place = "Table 9"\nplaec = 1', FileFaults, "plaec: unknown key"),
         ("[[section]]", "[section]", FileFaults, "no list of tables"),
-        ("[paper]", "[paper", InputError, "no valid TOML"),
+        ("[paper]", "[paper", InputError, "Mend the TOML there"),
     ],
 )
 def test_a_wrong_file_is_refused_by_place_and_name(old, new, error, named):
