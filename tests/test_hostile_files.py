@@ -11,7 +11,7 @@ import pytest
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="limits of a process are set as Linux has them"
 )
-FEW = "claimed-, gap, deep-meta-3, long-key., field, memory, columns, count, deep.json"
+FEW = "claimed-, gap, blank, deep-meta-3, long-key., field, memory, columns, count, deep.json"
 ROOT = Path(__file__).resolve().parents[1]
 
 
