@@ -24,6 +24,7 @@ import re
 import signal
 import sys
 import tempfile
+import time as wall_clock
 import tomllib
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -42,18 +43,32 @@ from screwkin.model.table import load_robot
 from screwkin.model.toml_out import robot_toml
 from screwkin.servo.virtual.bus import VirtualBus
 from screwkin.servo.virtual.faults import KINDS, InjectedFault
+from screwkin.servo.virtual.servo import VirtualServo
 from screwkin.trajectory import load_trajectory
 from tests.verdicts import passing
 
-OTHERS = ("stalled", "interrupted")
-"""Faults of the computer, not of the bus: it stands still for a moment; the user presses Ctrl-C."""
-ALL_KINDS = (*KINDS, *OTHERS)
-OF_ANSWERS = ("deaf", "dropped", "corrupted", "truncated", "late", "noise")
+OTHERS = ("stalled", "suspended", "clock", "interrupted")
+"""Faults of the computer, not of the bus: it stands still for a moment, or for long; its wall clock jumps; a
+signal asks the play to end."""
+BEFORE = ("misconfigured", "twin")
+"""Faults that are there from the start: a register holds something else; two servos have one id."""
+ALL_KINDS = (*KINDS, *OTHERS, *BEFORE)
+HARMLESS = ("noise", "stalled", "suspended", "clock", "interrupted", "blocked")
+"""Kinds after which every servo hears and answers: whoever is called dead is alive."""
+SIGNALS = (signal.SIGINT, signal.SIGTERM)
+REGISTERS = (
+    *({"angle_limit_low": 0, "angle_limit_high": 0}, {"angle_limit_high": 500}, {"angle_limit_low": 520}),
+    *({"max_torque": 300}, {"shutdown": 0}, {"shutdown": 4}, {"status_level": 0}, {"status_level": 1}),
+    *({"alarm_led": 0}, {"return_delay": 254}),
+)
+"""What a servo may be left with by its former owner: wheel mode, own limits, weak, careless, silent, slow."""
+OF_ANSWERS = ("deaf", "dropped", "corrupted", "truncated", "late", "noise", "mangled")
 
 TICK, CENTRE, SPEED_UNIT = math.radians(300 / 1024), 512, 0.111 * 2 * math.pi / 60
 TORQUE_ENABLE, GOAL, SPEED, TORQUE_LIMIT = 24, 30, 32, 34
 WIDTHS = {TORQUE_ENABLE: 1, GOAL: 2, SPEED: 2, TORQUE_LIMIT: 2}
 FRAME = 0.02  # s
+NEAR, NOTICE = 0.25 + TICK, 0.5 + 0.1 + FRAME  # rad and s: of the watchdog, and of goals of the last 0.1 s
 BYTES = 0.002  # s, longer than any packet takes
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "hardware.md"
 MARKS = ("<!-- campaign: python -m tests.servo.campaign --jobs 2 --docs -->", "<!-- end of campaign -->")
@@ -74,6 +89,9 @@ class Plan:
     torque: float
     on_fault: str
     at_end: str
+    adapter: float
+    signal: int
+    registers: dict[str, int]
 
     @classmethod
     def of(cls, seed: int, lasts: float) -> Plan:
@@ -82,24 +100,29 @@ class Plan:
         kind = ALL_KINDS[seed % len(ALL_KINDS)]
         at = float(rng.uniform(0.0, lasts))
         until = math.inf if rng.random() < 0.5 else at + float(rng.uniform(0.05, 2.0))
+        nobodys = kind in ("pulled", "mangled", *OTHERS) or rng.random() < 0.3
+        id = int(rng.integers(1, 19))
         return cls(
             seed=seed,
             kind=kind,
-            at=at,
-            until=until,
-            id=None if kind in ("pulled", *OTHERS) or rng.random() < 0.3 else int(rng.integers(1, 19)),
+            at=0.0 if kind in BEFORE else at,
+            until=math.inf if kind == "blocked" else until,
+            id=None if nobodys and kind not in BEFORE else id,
             share=float(rng.uniform(0.05, 1.0)) if kind in OF_ANSWERS and rng.random() < 0.5 else 1.0,
             volts=float(rng.uniform(3.0, 9.0)),
-            stall=float(rng.uniform(0.05, 0.5)),
+            stall=float(rng.uniform(2.0, 60.0) if kind == "suspended" else rng.uniform(0.05, 0.5)),
             torque=float(rng.uniform(0.3, 1.0)),
             on_fault=str(rng.choice(["hold", "limp"])),
             at_end=str(rng.choice(["hold", "limp"])),
+            adapter=0.001 if rng.random() < 0.7 else float(rng.uniform(0.0, 0.04)),
+            signal=int(rng.choice(SIGNALS)),
+            registers=REGISTERS[int(rng.integers(len(REGISTERS)))],
         )
 
     @property
     def faults(self) -> list[InjectedFault]:
         """What the virtual bus is told of it."""
-        if self.kind in OTHERS:
+        if self.kind in (*OTHERS, *BEFORE):
             return []
         return [InjectedFault(self.kind, self.at, self.until, self.id, self.share, self.volts)]
 
@@ -132,13 +155,14 @@ class Watched(VirtualBus):
 
     def __init__(self, plan: Plan, servos: Any, clock: Any, baud: int, *rest: Any, adapter: float) -> None:
         self.plan, self.told, self.closed_at = plan, [], math.nan
+        self.wall = contextlib.ExitStack()
         self._due = plan.at if plan.kind in OTHERS else math.inf
         rng = np.random.default_rng((plan.seed, 1))
         for servo in servos:
             servo.body.angle += float(rng.uniform(-0.15, 0.15))
-        super().__init__(servos, clock, baud, plan.faults, plan.seed, self._witness_of_all, adapter)
+        super().__init__(mounted(plan, servos), clock, baud, plan.faults, plan.seed, self._all, plan.adapter)
 
-    def _witness_of_all(self, time: float, id: int, command: Any) -> None:
+    def _all(self, time: float, id: int, command: Any) -> None:
         if command.kind in ("write", "register"):
             self.told.append((time, id, command.address, command.data))
 
@@ -146,13 +170,30 @@ class Watched(VirtualBus):
         if self.clock.now() >= self._due:
             self._due = math.inf
             if self.plan.kind == "interrupted":
-                os.kill(os.getpid(), signal.SIGINT)
+                os.kill(os.getpid(), self.plan.signal)
+            elif self.plan.kind == "clock":
+                now = wall_clock.time() + (1e6 if self.plan.seed % 2 else -1e6)
+                self.wall.enter_context(patch("time.time", lambda: now))
             else:
                 self.clock.sleep(self.plan.stall)
         return super().write(data)
 
     def close(self) -> None:
         self.closed_at = self.clock.now()
+        self.wall.close()
+
+
+def mounted(plan: Plan, servos: Sequence[VirtualServo]) -> list[VirtualServo]:
+    """The servos of a run, one of which may be set otherwise, or have a twin."""
+    mine = [servo for servo in servos if servo.id == plan.id]
+    if plan.kind == "misconfigured":
+        for servo in mine:
+            for name, value in plan.registers.items():
+                servo.put(name, value)
+    if plan.kind == "twin":
+        angle = mine[0].body.angle + 0.3
+        return [*servos, VirtualServo(mine[0].profile, mine[0].id, angle, return_delay=500e-6)]
+    return list(servos)
 
 
 def prepare(folder: Path, simulated: bool = True) -> float:
@@ -217,6 +258,8 @@ def played(plan: Plan, folder: Path) -> Ended:
         ended.problems += written_beyond(line, table, plan)
         ended.problems += told_wrongly(ended, table)
         if "faults" in ended.data:
+            ended.problems += called_dead(ended, table)
+            ended.problems += unnoticed(line, ended, table)
             ended.problems += left_otherwise(line, ended, table)
             ended.problems += log_incomplete(Path(kept) / "log" / "play.npz", ended)
         elif line.told or (Path(kept) / "log").exists():
@@ -252,15 +295,17 @@ def told_wrongly(ended: Ended, table: dict[str, Any]) -> Iterator[str]:
     """An exit code or a message that does not tell what happened."""
     plan, ids = ended.plan, table["servos"]["ids"]
     faults = ended.data.get("faults", [])
-    fitting = 4 if ended.outcome == "refused" else 130 if plan.kind == "interrupted" and faults else 4
-    if ended.code != (fitting if faults or ended.outcome == "refused" else 0):
+    unsure = ended.data.get("unconfirmed", []) or ended.data.get("state") == "unknown"
+    good = 130 if plan.kind == "interrupted" and faults and not unsure else 4
+    if ended.code != (good if faults or unsure or ended.outcome == "refused" else 0):
         yield f"exit code {ended.code} with {ended.outcome}"
     if ended.outcome == "refused":
-        if not re.search(
-            r"error: .*\w+( \(servo \d+\)|: servo \d+ (does not answer|answers with damage))", ended.message
-        ):
-            yield f"the refusal names no joint and id: {ended.message}"
+        yield from refused_wrongly(ended)
         return
+    if plan.kind == "misconfigured":
+        yield f"played with {plan.registers}"
+    if plan.kind == "twin" and not faults:
+        yield "two servos with one id went unnoticed"
     if not faults:
         return
     told = re.search(
@@ -280,6 +325,57 @@ def told_wrongly(ended: Ended, table: dict[str, Any]) -> Iterator[str]:
         yield f"nobody is blamed: {ended.message}"
     if ended.time < plan.at - BYTES:  # a packet suffers from what happens until its last byte
         yield "it stopped before anything had happened"
+
+
+def refused_wrongly(ended: Ended) -> Iterator[str]:
+    """A refusal that names nobody, or another; or that comes though nothing has happened."""
+    plan, message = ended.plan, ended.message
+    if "latency_timer" in message and plan.adapter > 0.004:
+        return
+    named = r"error: .*\w+( \(servo \d+\)|: servo \d+ (does not answer|answers with damage))"
+    if not re.search(named, message):
+        yield f"the refusal names no joint and id: {message}"
+    if ended.time < plan.at - BYTES:
+        yield f"refused, though nothing had happened yet: {message}"
+    if plan.kind == "misconfigured" and not any(
+        re.search(rf"\(servo {plan.id}\): (the status_level|{name})", message) for name in plan.registers
+    ):
+        yield f"{plan.registers} of servo {plan.id} is not named: {message}"
+
+
+def called_dead(ended: Ended, table: dict[str, Any]) -> Iterator[str]:
+    """Servos that are alive, and said not to answer."""
+    plan, ids = ended.plan, table["servos"]["ids"]
+    unsure = {ids[name] for name in ended.data["unconfirmed"]}
+    if plan.kind in HARMLESS and unsure:
+        yield f"servos {sorted(unsure)} are alive, and called dead"
+    apart = {1} if plan.kind == "reset" else set()  # a servo that was reset has that id
+    if plan.id is not None and unsure - {plan.id} - apart:
+        yield f"servos {sorted(unsure)} are called dead, and servo {plan.id} alone suffers"
+
+
+def unnoticed(line: Watched, ended: Ended, table: dict[str, Any]) -> Iterator[str]:
+    """A blocked joint that was farther than the watchdog's 0.25 rad from its goals for longer than 0.5 s."""
+    if ended.plan.kind != "blocked" or ended.outcome == "refused":
+        return
+    stopped = ended.data["faults"][0]["time"] + began(line) if ended.data["faults"] else ended.time
+    for servo in line.servos:
+        if ended.plan.id not in (None, servo.id):
+            continue
+        away = [
+            (time, abs((int.from_bytes(data[:2], "little") - CENTRE) * TICK - servo.body.angle))
+            for time, id, address, data in line.told
+            if id == servo.id and address == GOAL and ended.plan.at <= time <= stopped
+        ]
+        since = next((time for time, far in reversed(away) if far <= NEAR), ended.plan.at)
+        beyond = [time for time, far in away if time > since and far > NEAR]
+        if beyond and beyond[-1] - beyond[0] > NOTICE:
+            yield f"servo {servo.id} was blocked and unnoticed for {beyond[-1] - beyond[0]:.2f} s"
+
+
+def began(line: Watched) -> float:
+    """When torque came on [s]."""
+    return next(time for time, _, address, data in line.told if address == TORQUE_ENABLE and data[0] == 1)
 
 
 def left_otherwise(line: Watched, ended: Ended, table: dict[str, Any]) -> Iterator[str]:
@@ -322,7 +418,9 @@ def log_incomplete(path: Path, ended: Ended) -> Iterator[str]:
         last = float(log["sent"][-1]) if len(time) else 0.0
         if not last <= fault["time"] + 1e-9:
             yield "the log goes on after the fault"
-        if fault["time"] - last > FRAME + 0.2 + (ended.plan.stall if ended.plan.kind == "stalled" else 0.0):
+        if fault["time"] - last > FRAME + 0.2 + (
+            ended.plan.stall if ended.plan.kind in ("stalled", "suspended") else 0.0
+        ):
             yield f"the log ends at {last:.3f} s, the fault was at {fault['time']:.3f} s"
 
 

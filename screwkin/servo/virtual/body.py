@@ -58,6 +58,7 @@ class Body:
     time: float = 0.0
     overloaded: float = 0.0
     sag: float = 0.0
+    blocked: bool = False
 
     @property
     def supply(self) -> float:
@@ -83,7 +84,9 @@ class Body:
         if drive is None:
             self.rate, heat, strained = 0.0, 0.0, False
         else:
-            if isinstance(drive, ToAngle):
+            if self.blocked:
+                self.rate = 0.0
+            elif isinstance(drive, ToAngle):
                 self.angle, self.rate = follow(self.angle, drive.angle, dt, drive.speed, self.lag)
             else:
                 self.angle, self.rate = spin(self.angle, self.rate, drive.rate, dt, self.lag)

@@ -19,13 +19,13 @@ import numpy as np
 from screwkin.servo import protocol2
 from screwkin.servo.packets import BROADCAST, Packet, Request
 from screwkin.servo.protocols import Codec, codec
-from screwkin.servo.virtual.faults import InjectedFault, affected, deafened
+from screwkin.servo.virtual.faults import InjectedFault, affected, deafened, mangled
 from screwkin.servo.virtual.servo import VirtualServo
 
 _SILENCE = 0.005  # s, after which no more bytes of a packet are waited for
 _BITS_PER_BYTE = 10
 _SAME_RATE = 0.03  # of the rate: what both ends of a line tolerate
-_SERVOS_OWN = ("reset", "overload", "overheat", "brown-out")
+_SERVOS_OWN = ("reset", "overload", "blocked", "overheat", "brown-out")
 
 Witness = Callable[[float, int, Request], None]
 """Called with time, servo id and command for every command that reaches a servo."""
@@ -128,7 +128,7 @@ class VirtualBus:
         self._plugged(now)
         sent = max(now, self._free) + len(data) * self._byte_time
         self._free = self._last = sent
-        self._hear(bytes(data), sent)
+        self._hear(mangled(self._faults, sent, bytes(data), self._random), sent)
         return len(data)
 
     def read(self, size: int = 1) -> bytes:

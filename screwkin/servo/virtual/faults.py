@@ -19,8 +19,10 @@ Kind = Literal[
     "truncated",
     "late",
     "noise",
+    "mangled",
     "reset",
     "overload",
+    "blocked",
     "overheat",
     "brown-out",
     "pulled",
@@ -36,10 +38,11 @@ class InjectedFault:
     """Something that goes wrong from ``at`` to ``until`` [s of the bus's clock].
 
     ``deaf``: commands do not reach the servo. ``dropped``, ``corrupted``, ``truncated``, ``late`` (0.2 s),
-    ``noise`` (bytes before it): of answers. ``reset``: the servo starts anew. ``overload``: twice the stall
-    torque on it. ``overheat``: 10 degrees above its limit. ``brown-out``: ``volts`` for it. ``pulled``: the
-    port is gone. ``id`` is the servo concerned, None all; ``share`` is how many of the answers or
-    commands concerned are affected.
+    ``noise`` (bytes before it): of answers. ``mangled``: a byte of what the computer sends is another.
+    ``reset``: the servo starts anew. ``overload``: twice the stall torque on it. ``blocked``: it cannot turn.
+    ``overheat``: 10 degrees above its limit. ``brown-out``: ``volts`` for it. ``pulled``: the port is gone.
+    ``id`` is the servo concerned, None all; ``share`` is how many of the answers or commands concerned are
+    affected.
     """
 
     kind: Kind
@@ -66,6 +69,8 @@ class InjectedFault:
             servo.reset(self.at)
         elif self.kind == "overload":
             body.load = 2 * body.stall_torque
+        elif self.kind == "blocked":
+            body.blocked = True
         elif self.kind == "overheat":
             body.temperature = body.ambient = servo.get("temperature_limit") + 10.0
         elif self.kind == "brown-out":
@@ -76,6 +81,8 @@ class InjectedFault:
         body = servo.body
         if self.kind == "overload":
             body.load = 0.0
+        elif self.kind == "blocked":
+            body.blocked = False
         elif self.kind == "overheat":
             body.temperature = body.ambient = 30.0
         elif self.kind == "brown-out":
@@ -112,3 +119,17 @@ def deafened(faults: Sequence[InjectedFault], id: int, time: float, random: np.r
         and (fault.share == 1 or random.random() < fault.share)
         for fault in faults
     )
+
+
+def mangled(faults: Sequence[InjectedFault], time: float, data: bytes, random: np.random.Generator) -> bytes:
+    """What becomes of bytes that the computer sends."""
+    for fault in faults:
+        if (
+            fault.kind == "mangled"
+            and fault.at <= time < fault.until
+            and random.random() < fault.share
+            and data
+        ):
+            place, flip = int(random.integers(len(data))), int(random.integers(1, 256))
+            data = data[:place] + bytes((data[place] ^ flip,)) + data[place + 1 :]
+    return data
