@@ -19,11 +19,11 @@ def walk(tmp_path_factory):
 
 
 @pytest.mark.parametrize("kind", range(KINDS), ids=ALL_KINDS)
-def test_two_runs_with_a_fault_of_each_kind_end_as_they_must(walk, kind):
-    runs = campaign(range(kind, 2 * KINDS, KINDS), *walk)
-    assert {run.plan.kind for run in runs} == {ALL_KINDS[kind]}
-    assert [(run.plan, run.problems) for run in runs if run.problems] == []
-    assert summary(runs).count("\n") == 2
+def test_a_run_with_a_fault_of_each_kind_ends_as_it_must(walk, kind):
+    (run,) = campaign([kind], *walk)
+    assert run.plan.kind == ALL_KINDS[kind]
+    assert run.problems == [], run.plan
+    assert summary([run]).count("\n") == 2
 
 
 def test_a_goal_beyond_the_limits_would_be_noticed(walk, monkeypatch):
