@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from tests.servo.campaign import ALL_KINDS, Plan, campaign, played, prepare, summary
+from tests.servo.campaign import campaign, played, prepare, summary
+from tests.servo.campaign_plan import ALL_KINDS, Plan
 
 KINDS = len(ALL_KINDS)
 
