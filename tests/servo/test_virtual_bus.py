@@ -313,7 +313,7 @@ def test_troubles_unknown_or_contrary_are_refused():
         InjectedFault("fire")
     with pytest.raises(InputError, match="at <= until"):
         InjectedFault("late", at=2.0, until=1.0)
-    assert len(KINDS) == 11
+    assert len(KINDS) == 13
 
 
 def test_the_servos_of_a_robot_stand_where_its_joints_are():
