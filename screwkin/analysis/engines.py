@@ -117,9 +117,7 @@ def engines_for(engine: Engine, robot: Robot, compliance: SimulatedCompliance) -
         raise UnknownNameError("engine", engine, ENGINES)
     if engine != "auto":
         return (engine,)
-    able: list[Engine] = []
-    if not robot.closures:
-        able.append("pybullet")
+    able: list[Engine] = ["pybullet"]
     if compliance.sole_stiffness is None:
         able.append("mujoco")
     installed = tuple(name for name in able if importlib.util.find_spec(name) is not None)

@@ -12,6 +12,7 @@ from screwkin.algebra.se3 import IDENTITY, ZERO, Vector
 from screwkin.errors import UnreachableError, one_of
 from screwkin.mechanism.choice import CLOSED, closed_mechanism, mobility_at
 from screwkin.mechanism.closure import close_loops
+from screwkin.mechanism.linkages import motor_joints
 from screwkin.mechanism.mechanism import Mechanism
 from screwkin.mechanism.network import coupling_twists, network_of_twists
 from screwkin.mechanism.singularity import LimbSingularity, singularity_report
@@ -104,12 +105,11 @@ def facts_of(
         network_of_twists(mechanism, coupling_twists(mechanism, IDENTITY, q, p)) for p in (ZERO, about)
     )
     state = State(np.eye(4), np.array(q, dtype=float))
-    driven = set(mechanism.primary) if robot.closures else set(robot.joint_names)
     mobility = int(mobility_at(mechanism, at_waist)) if len(N) else len(mechanism.couplings)
     return Facts(
         robot=robot,
         mechanism=mechanism,
-        actuated_joints=tuple(name for name in robot.joint_names if name in driven),
+        actuated_joints=motor_joints(robot),
         rank=len(mechanism.couplings) - mobility,
         condition=_condition(N[:, mechanism.secondary_columns]),
         state=state,

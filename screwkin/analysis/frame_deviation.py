@@ -7,6 +7,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, unstack
 from screwkin.dynamics.support import sole_corners
+from screwkin.ik.linked import carried_by_motors
 from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.model.robot import Robot
 from screwkin.servo.frames import Frames
@@ -33,7 +34,11 @@ def frame_deviation(robot: Robot, trajectory: Trajectory, bounds: Bounds, frames
     finest = min(1.0 / frames.rate, float(np.diff(trajectory.time).min()))
     count = int(np.ceil(_BETWEEN * trajectory.duration / finest)) + 1
     time = np.linspace(0.0, trajectory.duration, count)
-    goals = bounds.radians(bounds.ticks(frames.q))
+    goals, planned = (
+        bounds.radians(bounds.ticks(frames.q)),
+        trajectory.sampled(trajectory.time[0] + frames.time),
+    )
+    goals = carried_by_motors(robot, bounds.names, goals, planned[0])
     nearest = np.clip(np.rint(time * frames.rate).astype(int), 0, len(goals) - 1)
     path = trajectory.sampled(trajectory.time[0] + time)[0]
     away = _points(robot, goals)[nearest] - _points(robot, path)

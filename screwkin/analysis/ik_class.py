@@ -13,11 +13,13 @@ from screwkin.ik.all_branches import by_relative, has_branches
 from screwkin.ik.closed import recognised
 from screwkin.ik.elimination import BRANCHES
 from screwkin.ik.limb import resting
+from screwkin.ik.linked import completed_limb, linked_chain, with_linkages
 from screwkin.ik.methods import solve_limb
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.relative import relative
 from screwkin.ik.starts import box, spread
 from screwkin.kinematics.serial_chain import SerialChain, forward
+from screwkin.mechanism.linkages import limb_linkages
 from screwkin.model.robot import Robot
 
 POSES = 32
@@ -51,25 +53,31 @@ class IkClass:
 
 
 def ik_classes(robot: Robot) -> tuple[IkClass, ...]:
-    """The class of every limb; none of a robot whose loops limbs do not know."""
-    return () if robot.closures else tuple(_class_of(robot, limb.name) for limb in robot.limbs)
+    """The class of every limb."""
+    return tuple(_class_of(robot, limb.name) for limb in robot.limbs)
 
 
 def _class_of(robot: Robot, limb: str) -> IkClass:
     try:
-        chain = SerialChain.of(robot, limb)
+        chain, linked = SerialChain.of(robot, limb), bool(limb_linkages(robot, limb))
     except InputError as error:
         return IkClass(limb, "pose", str(error), 0, float("nan"), 0)
     position = len(chain.joints) <= 3
     family, branches = _family(chain, position)
     low, high = box(chain)
     q = low + spread(len(chain.joints), POSES, 0) * (high - low)
-    tips = as_array(forward(chain.screws, unstack(q), chain.tip)[0], (POSES,))
+    if linked:
+        whole, gap = completed_limb(robot, chain, q)
+        q = q[(gap == 0) & linked_chain(robot, chain).within(whole)]
+    poses = len(q)
+    tips = as_array(forward(chain.screws, unstack(q), chain.tip)[0], (poses,))
     target = tips[:, :3, 3] if position else tips
-    guess = np.tile(resting(robot, chain), (POSES, 1))
-    found = solve_limb(chain, target, "auto", guess, IkSettings(), (POSES,))
-    solved = float(found.in_limits.any(axis=1).mean())
-    return IkClass(limb, "position" if position else "pose", family, branches, solved, POSES)
+    guess = np.tile(resting(robot, chain), (poses, 1))
+    found = solve_limb(chain, target, "auto", guess, IkSettings(), (poses,))
+    if linked:
+        found = with_linkages(robot, found, guess)
+    solved = float(found.in_limits.any(axis=1).mean()) if poses else float("nan")
+    return IkClass(limb, "position" if position else "pose", family, branches, solved, poses)
 
 
 def _family(chain: SerialChain, position: bool) -> tuple[str, int]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.errors import InputError
-from screwkin.model.robot import Robot
+from screwkin.model.robot import Robot, refuse_closures
 from screwkin.servo.log import PlayLog
 from screwkin.servo.servo_map import ServoMap
 from screwkin.trajectory import Trajectory, check_joints
@@ -33,6 +33,7 @@ def replayed(robot: Robot, trajectory: Trajectory, log: PlayLog) -> tuple[Trajec
         InputError: a log of another trajectory or robot, one that ends before the walk begins, or a joint
             was hardly read. TableError: the faults of ``[servos]``.
     """
+    refuse_closures(robot, "replay", "compare the positions of its motors in the log with the trajectory's")
     _check_same(robot, trajectory, log)
     count = int((trajectory.time - trajectory.time[0] <= log.end + 1e-9).sum())  # 0 if it never began
     if count < 2:

@@ -195,7 +195,7 @@ def judged(
     legs = tuple(limb.tip for limb in robot.limbs if limb.kind == "leg")
     zmp, slipped = zmp_record(run, trajectory), slip(run, trajectory, legs)
     rms, largest = _deviation(zmp.contact - zmp.planned)
-    ankle, _ = _deviation(zmp.ankle - zmp.contact)
+    ankle = None if _rods_end_at_feet(robot) else _deviation(zmp.ankle - zmp.contact)[0]
     last, planned = run.T_world_base[-1], trajectory.T_world_base
     reached = _distance(trajectory.T_world_base[0], last)
     torque, speed = torque_use(run, robot), speed_use(trajectory, robot)
@@ -292,6 +292,12 @@ def _warnings(robot: Robot, trajectory: Trajectory, run: Run, slipped: Slip, spe
     if slipped.turned > np.deg2rad(5.0):
         warnings.append(f"a stance foot turns by {np.rad2deg(slipped.turned):.1f} deg")
     return tuple(warnings)
+
+
+def _rods_end_at_feet(robot: Robot) -> bool:
+    """Whether a loop ends at a leg's last link, so that the joint above it does not carry the foot alone."""
+    feet = {limb.link for limb in robot.limbs if limb.kind == "leg"}
+    return any({closure.link_a, closure.link_b} & feet for closure in robot.closures)
 
 
 def _deviation(error: Array) -> tuple[tuple[float, float] | None, tuple[float, float] | None]:

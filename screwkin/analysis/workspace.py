@@ -23,7 +23,7 @@ from screwkin.ik.limb import resting
 from screwkin.ik.limb_map import limb_map
 from screwkin.ik.reach import OUT_OF_REACH, REACHABLE, cause_names, reach
 from screwkin.kinematics.serial_chain import SerialChain
-from screwkin.model.robot import Robot, refuse_closures
+from screwkin.model.robot import Robot
 
 Progress = Callable[[float], None]
 
@@ -48,7 +48,7 @@ class WorkspaceMap:
         x: (X,) forward [m].
         y: (Y,) to the left [m].
         cause: (X, Y) index into ``causes``.
-        causes: reachable, out of reach, then the lower and upper limit of every joint.
+        causes: reachable, out of reach, then the lower and upper limit of every joint, linkages last.
         inverse_condition: (X, Y) in [0, 1], 0 singular; NaN where not reachable.
         q: (X, Y, n) joint positions inside the limits, nearest to the home posture; NaN where not reachable.
     """
@@ -107,11 +107,10 @@ def workspace(
         progress: called with the share done.
 
     Raises:
-        InputError: the limb has too few joints, heights or resolution make no grid, or there are closures.
+        InputError: the limb has too few joints, heights or resolution make no grid.
         UnknownNameError: no such limb.
     """
     chain = SerialChain.of(robot, limb)
-    refuse_closures(robot, "workspace", "no function maps those of closed loops yet")
     if len(chain.joints) < 6:
         raise InputError(
             f"{chain.limb} has {len(chain.joints)} joints; six are needed to hold its tip's orientation"
@@ -190,7 +189,7 @@ def _level(
         x[rows],
         y[columns],
         cause.reshape(shape)[rows, columns],
-        cause_names(chain),
+        cause_names(robot, chain.limb),
         inverse.reshape(shape)[rows, columns],
         q.reshape(*shape, n)[rows, columns],
     )

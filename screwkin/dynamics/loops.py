@@ -31,6 +31,7 @@ from screwkin.errors import InputError, SingularError, one_of
 from screwkin.mechanism.choice import RANK_TOLERANCE, closed_mechanism
 from screwkin.mechanism.closure import closure_errors
 from screwkin.mechanism.least_values import least_values
+from screwkin.mechanism.linkages import motor_joints
 from screwkin.mechanism.mechanism import Mechanism
 from screwkin.mechanism.network import coupling_twists, network_blocks, twist_rates
 from screwkin.mechanism.rates import flat
@@ -206,13 +207,15 @@ def _sum(twists: Iterable[Twist]) -> Twist:
 
 @kept
 def actuated_joints(robot: Robot, names: tuple[str, ...] | None) -> tuple[int, ...]:
-    """Indices in q of the joints that have motors; by default those that drive.
+    """Indices in q of the joints that have motors; by default ``motor_joints``.
 
     Raises:
         UnknownNameError: no such joint. InputError: named twice, or too few for the motions.
         SingularError: at the home posture there is a motion that they cannot drive.
     """
     driving = driving_joints(robot)
+    if names is None and robot.closures:
+        names = motor_joints(robot)
     if names is None:
         return tuple(robot.joint_names.index(name) for name in driving)
     chosen = [one_of("joint", name, robot.joint_names) for name in names]

@@ -111,7 +111,7 @@ def inverse_dynamics(
         base_twist: [omega; v of the base origin], world axes; default: zero.
         base_acceleration: its time derivative [alpha; a]; default: zero.
         gravity: [m/s^2], along -z of the world; a number, or one for every sample.
-        actuated: a tuple of the joints that have motors; default: those that drive (``driving_joints``).
+        actuated: a tuple of the joints that have motors; default: ``mechanism.linkages.motor_joints``.
             Where they are more than the motions, the sum of the squares of their efforts is least.
 
     Returns:

@@ -21,6 +21,7 @@ from screwkin.gait.held import with_held_joints
 from screwkin.gait.stance import Stance
 from screwkin.gait.upright import upright
 from screwkin.kinematics.positions import chain_jacobian, successive_displacement, tree_positions
+from screwkin.mechanism.linkages import linkages
 from screwkin.model.robot import Limb, Robot
 from screwkin.trajectory import Trajectory
 
@@ -89,8 +90,8 @@ def driven(robot: Robot, at_rest: tuple[str, ...] = ()) -> Driven:
     """What a gait drives of a robot with a ``home`` posture.
 
     Legs follow poses with up to six joints of their own. Arms of six joints follow poses, of any other number
-    positions with the three that move the hand best; with fewer than three they rest. A robot with closures
-    is driven as a whole.
+    positions with the three that move the hand best; with fewer than three they rest. Linkages
+    of joints that move follow them.
 
     Args:
         robot: with a ``home`` posture.
@@ -125,12 +126,11 @@ def _moving(robot: Robot, at_rest: tuple[str, ...]) -> Parts:
         for limb, other in zip(robot.limbs, standing.limbs, strict=True)
         if limb.frame is not other.frame
     }
-    if robot.closures:
-        return None if standing is robot else standing, tuple(range(len(home))), home, (), turned
     chosen = {limb.name: _chosen(robot, limb, home) for limb in robot.limbs}
     few = tuple(name for name, joints in chosen.items() if not joints)
     resting = {*few, *at_rest}
     moving = {i for name, joints in chosen.items() if name not in at_rest for i in joints}
+    moving |= {i for linkage in linkages(robot) if moving & set(linkage.path) for i in linkage.joints}
     rest = {joint.name: float(home[i]) for i, joint in enumerate(robot.joints) if i not in moving}
     reduced = with_held_joints(standing, rest)
     if resting:

@@ -8,6 +8,7 @@ from screwkin.errors import LimitError, SingularError, UnreachableError
 from screwkin.gait.arms import unable_arms
 from screwkin.gait.driven import Driven, arms_of, driven
 from screwkin.gait.lengths import lengths_of
+from screwkin.gait.linkages import dead_points
 from screwkin.gait.plan import Plan, plan
 from screwkin.gait.preview_plan import preview_plan
 from screwkin.gait.realise import differentiate, posed_hands, positions
@@ -31,7 +32,7 @@ class Followed:
         planned: T samples.
         solution: joint positions.
         motion: joint rates and accelerations.
-        notes: why limbs rest.
+        notes: why limbs rest, and which linkages come near a dead point.
     """
 
     drive: Driven
@@ -77,13 +78,14 @@ def follow(robot: Robot, gait: Gait, steps: int, at_rest: tuple[str, ...] = ()) 
             else:
                 planned = preview_plan(mechanism, gait, stance, steps)
             solution = positions(mechanism, planned)
+            near = dead_points(drive.moving, planned.time, solution.state.q)
             motion = differentiate(mechanism, planned, solution.state)
         except (UnreachableError, SingularError, LimitError) as error:
             if error.limb not in [limb.name for limb in robot.limbs if limb.kind != "leg"]:
                 raise
             at_rest, notes = (*at_rest, error.limb), (*notes, _rests(robot, gait, error.limb, str(error)))
         else:
-            return Followed(drive, mechanism, planned, solution, motion, notes)
+            return Followed(drive, mechanism, planned, solution, motion, (*notes, *near))
 
 
 def _rests(robot: Robot, gait: Gait, arm: str, why: str) -> str:

@@ -12,8 +12,9 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.screws import carry, displacement
 from screwkin.algebra.se3 import IDENTITY, Pose, Vector, as_array
 from screwkin.errors import InputError
+from screwkin.mechanism.linkages import loop_joints
 from screwkin.model.records import Frame
-from screwkin.model.robot import Inertia, Joint, Limb, Link, Robot, Sole
+from screwkin.model.robot import Closure, Inertia, Joint, Limb, Link, Robot, Sole
 
 Kind = TypeVar("Kind", bound=Joint)
 
@@ -27,18 +28,23 @@ def with_held_joints(robot: Robot, positions: Mapping[str, float]) -> Robot:
     text are left out.
 
     Args:
-        robot: without closures.
+        robot: any robot; of loops all joints are held, or none.
         positions: of the held joints by name [rad or m].
 
     Raises:
-        UnknownNameError: no such joint. InputError: the robot has closures.
+        UnknownNameError: no such joint. InputError: some joints of a loop are held, others are not.
     """
     if not positions:
         return robot
-    if robot.closures:
-        raise InputError(f"{robot.name} has closures; its joints cannot be held one by one")
     for name in positions:
         robot.joint(name)
+    for closure in robot.closures:
+        loop = {robot.joint_names[i] for i in loop_joints(robot, closure)}
+        if loop & set(positions) and not loop <= set(positions):
+            raise InputError(
+                f"{robot.name} has closures ({closure.name}); hold all joints of a loop, or none: "
+                f"{', '.join(sorted(loop - set(positions)))} would have to follow"
+            )
     moved, body = {robot.base_link: IDENTITY}, {robot.base_link: robot.base_link}
     held = {c.name: c.ratio * positions[c.leader] + c.offset for c in robot.coupled if c.leader in positions}
     held |= positions
@@ -58,6 +64,11 @@ def with_held_joints(robot: Robot, positions: Mapping[str, float]) -> Robot:
     def place_of(place: Frame) -> Frame:
         return replace(place, link=body[place.link], pose=moved[place.link] @ place.pose)
 
+    def closure_of(closure: Closure) -> Closure:
+        a, b = closure.link_a, closure.link_b
+        ends = {"frame_a": moved[a] @ closure.frame_a, "frame_b": moved[b] @ closure.frame_b}
+        return replace(closure, link_a=body[a], link_b=body[b], **ends)
+
     def sole_of(sole: Sole) -> Sole:
         T = moved[robot.limb(sole.limb).link]
         return replace(sole, corners=tuple(T @ corner for corner in sole.corners))
@@ -71,6 +82,7 @@ def with_held_joints(robot: Robot, positions: Mapping[str, float]) -> Robot:
         limbs=tuple(map(limb_of, robot.limbs)),
         soles=tuple(map(sole_of, robot.soles)),
         frames=tuple(map(place_of, robot.frames)),
+        closures=tuple(closure_of(c) for c in robot.closures if body[c.link_a] != body[c.link_b]),
         postures=tuple(replace(p, q=tuple(p.q[i] for i in left)) for p in robot.postures),
         text="",
     )

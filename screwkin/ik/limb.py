@@ -11,12 +11,14 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.scalar import is_jax
 from screwkin.errors import InputError
+from screwkin.ik.linked import linked_chain, with_linkages
 from screwkin.ik.methods import Method, solve_limb_arrays
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.solutions import LimbSolutions
 from screwkin.ik.system import checked_free, refuse_free_in_jax
 from screwkin.kinematics.arrays import of_shape
 from screwkin.kinematics.serial_chain import SerialChain
+from screwkin.mechanism.linkages import limb_linkages
 from screwkin.model.robot import Robot, refuse_closures
 
 DEFAULT = IkSettings()
@@ -55,7 +57,9 @@ def limb_ik(
 
     Returns:
         LimbSolutions: ``.q`` (..., branches, n) best first, ``.valid .in_limits .residual .iterations``
-        (..., branches), ``.status`` (...,), ``.best`` (..., n), ``.path()``. Nothing is raised for samples
+        (..., branches), ``.status`` (...,), ``.best`` (..., n), ``.path()``. Where loops run through the
+        limb, joints of its linkages, motors among them, stand behind its own: ``.joint_names`` names all, a
+        branch is one where the linkages close, and limits are those of all. Nothing is raised for samples
         without solution; their first branch is the least-squares answer. JAX arrays give JAX arrays, also
         traced (``jit``, ``vmap``, ``grad``): joints follow the target by the inverse of the Jacobian.
 
@@ -63,7 +67,7 @@ def limb_ik(
         UnknownNameError: no such limb.
         ShapeError: wrong shape, NaN or infinity, or a pose that is not rigid.
         InputError: an unknown method, or one that does not fit the limb (for
-            ``"closed"`` the message says what the limb's geometry lacks); or the robot has closures.
+            ``"closed"`` the message says what the limb's geometry lacks); or JAX arrays, and loops.
 
     Example:
         >>> import numpy as np
@@ -77,9 +81,43 @@ def limb_ik(
     """
     if method not in get_args(Method):
         raise InputError(f"method is {method!r}; valid: {', '.join(get_args(Method))}")
-    refuse_closures(robot, "limb_ik", "use close_loops")
     chain = SerialChain.of(robot, limb)
     settings, start = settings or DEFAULT, resting(robot, chain) if guess is None else guess
+    solve = _linked_ik if limb_linkages(robot, limb) else _free_ik
+    return solve(robot, chain, T_base_tip, method, start, settings, least_squares, free)
+
+
+def _linked_ik(
+    robot: Robot,
+    chain: SerialChain,
+    T_base_tip: Any,
+    method: Method,
+    start: Any,
+    settings: IkSettings,
+    least_squares: bool,
+    free: Sequence[str],
+) -> LimbSolutions:
+    """The same for a limb with linkages."""
+    if is_jax(T_base_tip) or is_jax(start):
+        refuse_closures(robot, "limb_ik of JAX arrays", "give NumPy arrays")
+    own, whole = len(chain.names), len(linked_chain(robot, chain).names)
+    start = of_shape("guess", start, whole if np.shape(start)[-1:] == (whole,) else own)
+    near = start[..., :own]
+    solutions = _free_ik(robot, chain, T_base_tip, method, near, settings, least_squares, free)
+    return with_linkages(robot, solutions, start)
+
+
+def _free_ik(
+    robot: Robot,
+    chain: SerialChain,
+    T_base_tip: Any,
+    method: Method,
+    start: Any,
+    settings: IkSettings,
+    least_squares: bool,
+    free: Sequence[str],
+) -> LimbSolutions:
+    """Joint positions of a limb whose joints are free."""
     if is_jax(T_base_tip) or is_jax(start):
         from screwkin.ik.implicit import limb_in_jax
 
@@ -88,7 +126,7 @@ def limb_ik(
     if not free or np.shape(T_base_tip)[-2:] != (4, 4):
         return solve_limb_arrays(chain, T_base_tip, method, start, settings, least_squares)
     start = of_shape("guess", start, len(chain.names))
-    longer = SerialChain.of(robot, limb, checked_free(free))
+    longer = SerialChain.of(robot, chain.limb, checked_free(free))
     start = np.concatenate([start, np.zeros((*start.shape[:-1], len(free)))], axis=-1)
     solutions = solve_limb_arrays(longer, T_base_tip, method, start, settings, least_squares)
     own = solutions.q[..., : len(chain.names)]

@@ -35,7 +35,7 @@ def solve_pose(
 
     Of several solutions of a limb the one nearest to the guess within the limits is taken, else the nearest
     outside. Joints that limbs share are solved for all of them together; joints that no target needs rest at
-    the guess.
+    the guess. Where loops run through a limb, its motors and pins follow, and limits are those of all.
 
     Args:
         robot: the robot.
@@ -57,7 +57,7 @@ def solve_pose(
     Raises:
         UnknownNameError: a target is no tip.
         ShapeError: wrong shape, NaN or infinity, a pose that is not rigid, or batches that do not fit.
-        InputError: no tip has a target, an unknown method, or the robot has closures.
+        InputError: no tip has a target, an unknown method, or JAX arrays for a robot with closures.
 
     Example:
         >>> import screwkin as sk
@@ -69,7 +69,6 @@ def solve_pose(
     """
     if method not in get_args(Method):
         raise InputError(f"method is {method!r}; valid: {', '.join(get_args(Method))}")
-    refuse_closures(robot, "solve_pose", "use close_loops")
     given, labels = dict(targets), {name: f"targets[{name!r}]" for name in targets}
     guess = home(robot) if guess is None else guess
     if "base" not in given:
@@ -90,6 +89,7 @@ def solve_pose(
     if is_jax(q) or any(map(is_jax, wanted.values())):
         from screwkin.ik.implicit import pose_in_jax
 
+        refuse_closures(robot, "solve_pose of JAX arrays", "give NumPy arrays")
         refuse_free_in_jax(open_)
         rigid = {name: checked(labels[name], target) for name, target in wanted.items()}
         return pose_in_jax(robot, rigid, q, batch, method, settings)

@@ -25,6 +25,7 @@ from screwkin.kinematics.serial_chain import SerialChain, cached, miss
 from screwkin.kinematics.status import SINGULAR
 from screwkin.mechanism.limb_motion import seen_screws
 from screwkin.mechanism.limb_rates import point_rates, pose_rates, split_of
+from screwkin.mechanism.linkages import crossed_linkages
 from screwkin.model.records import LIMIT_TOLERANCE
 from screwkin.model.robot import Robot
 
@@ -293,6 +294,6 @@ def limb_programs_of(robot: Robot, free: Mapping[str, tuple[str, ...]] | None = 
         robot: the robot.
         free: by tip, rotations that follow.
     """
-    limbs = [] if robot.closures else robot.limbs
+    limbs = [limb for limb in robot.limbs if not crossed_linkages(robot, limb.name)]
     chains = [SerialChain.of(robot, limb.name, (free or {}).get(limb.tip, ())) for limb in limbs]
     return [program for chain in chains for program in limb_programs(chain)]

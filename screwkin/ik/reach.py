@@ -16,11 +16,13 @@ from screwkin.algebra.se3 import as_array
 from screwkin.compiler.run import run
 from screwkin.ik.closed import recognised
 from screwkin.ik.limb_map import NEAR, limb_map
+from screwkin.ik.linked import linked_chain, with_linkages
 from screwkin.ik.methods import solve_limb
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.solutions import LimbSolutions
 from screwkin.kinematics.limits import beyond
 from screwkin.kinematics.serial_chain import SerialChain, residual
+from screwkin.mechanism.linkages import limb_linkages
 from screwkin.model.robot import Robot
 
 REACHABLE, OUT_OF_REACH = 0, 1
@@ -40,9 +42,10 @@ class Reach(NamedTuple):
     inverse_condition: Array
 
 
-def cause_names(chain: SerialChain) -> tuple[str, ...]:
-    """Reachable, out of reach, then the lower and upper limit of every joint."""
-    sides = [f"{name} {side}" for name in chain.names for side in ("lower", "upper")]
+def cause_names(robot: Robot, limb: str) -> tuple[str, ...]:
+    """Reachable, out of reach, then the lower and upper limit of every joint, those of linkages last."""
+    names = linked_chain(robot, SerialChain.of(robot, limb)).names
+    sides = [f"{name} {side}" for name in names for side in ("lower", "upper")]
     return ("reachable", "out of reach", *sides)
 
 
@@ -60,7 +63,8 @@ def reach(robot: Robot, limb: str, points: Array, guess: Array, length: float) -
     cause = np.full(count, OUT_OF_REACH, dtype=np.int16)
     q, inverse = np.full((count, len(chain.joints)), np.nan), np.full(count, np.nan)
     certified = conditioned = np.zeros(count, dtype=bool)
-    if recognised(chain) is not None:
+    linked = bool(limb_linkages(robot, limb))
+    if recognised(chain) is not None and not linked:
         out = run(limb_map(robot, chain.limb, tuple(guess.tolist()), length), {"point": points})
         certified, conditioned = out["certified"].T > 0
         cause, q, inverse = out["cause"][:, 0].astype(np.int16), out["q"], out["inverse"][:, 0]
@@ -69,7 +73,9 @@ def reach(robot: Robot, limb: str, points: Array, guess: Array, length: float) -
         start = np.tile(guess, (len(rows), 1))
         target = _targets(chain, points[rows])
         solved = solve_limb(chain, target, "auto", start, IkSettings(), (len(rows),), nearest=False)
-        cause[rows], q[rows] = _causes(chain, solved), solved.best
+        solved = with_linkages(robot, solved, guess) if linked else solved
+        assert solved.chain is not None
+        cause[rows], q[rows] = _causes(solved.chain, solved), solved.best[:, : len(chain.joints)]
     reached = cause == REACHABLE
     q[~reached], inverse[~reached] = np.nan, np.nan
     rows = np.flatnonzero(reached & ~(certified & conditioned))

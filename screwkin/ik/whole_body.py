@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
@@ -15,6 +16,7 @@ from screwkin.compiler.program import kept
 from screwkin.ik.all_branches import has_branches
 from screwkin.ik.branches import certified_pose, closed_pose
 from screwkin.ik.closed import recognised
+from screwkin.ik.linked import completed_limb, first_linked, linked_chain
 from screwkin.ik.methods import solve_limb
 from screwkin.ik.numeric import IkSettings, arrived, solve_system
 from screwkin.ik.pose_solution import PoseSolution
@@ -23,6 +25,7 @@ from screwkin.kinematics import limits
 from screwkin.kinematics.arrays import checked, exact_target
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.kinematics.status import CLOSED, SINGULAR, Status
+from screwkin.mechanism.linkages import limb_linkages
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 
@@ -80,8 +83,10 @@ def solve_whole_body(
     }
     for rows in _apart(robot, tuple(flat)):
         chain, target = limbs[rows[0]][1:]
-        solve = _by_newton
-        if len(rows) == 1 and method == "auto":
+        solve: Callable[[_Work, Sequence[Limb], Sequence[int]], None] = _by_newton
+        if any(limb_linkages(robot, limbs[row][1].limb) for row in rows):
+            solve = partial(_by_linkages, robot, method)
+        elif len(rows) == 1 and method == "auto":
             if recognised(chain, target.ndim == 2):
                 solve = _by_closed_form
             elif target.ndim == 3 and has_branches(chain):
@@ -168,6 +173,40 @@ def _by_newton(work: _Work, limbs: Sequence[Limb], rows: Sequence[int]) -> None:
     x, iterations = solve_system(system, "newton", guess, settings)
     x = limits.nearest_turn(x, guess, system.lower, system.upper, system.turning)
     _fill(work, system, x, iterations, rows)
+
+
+def _by_linkages(
+    robot: Robot, method: Method, work: _Work, limbs: Sequence[Limb], rows: Sequence[int]
+) -> None:
+    """Limbs with linkages: one limb by the best of all its branches, limbs that share joints by Newton's."""
+    base = exact_target("base", checked("base", work.base))
+    targets = [in_base(base, exact_target(tip, checked(tip, target))) for tip, _, target in limbs]
+    if len(limbs) > 1:
+        _by_newton(work, limbs, rows)
+    else:
+        (chain,), (target,) = [chain for _, chain, _ in limbs], targets
+        guess = work.q[:, list(chain.joints)]
+        solutions = solve_limb(chain, target, method, guess, work.settings, (len(target),))
+        x = chain.nearest_turn(first_linked(robot, solutions), guess)
+        _fill(work, System([chain], [target]), x, solutions.iterations[:, 0], rows)
+    for (_, chain, _), row in zip(limbs, rows, strict=True):
+        _complete(robot, work, chain, row)
+
+
+def _complete(robot: Robot, work: _Work, chain: SerialChain, row: int) -> None:
+    """Put the joints of a limb's linkages in their places, judged."""
+    linked, parts = linked_chain(robot, chain), work.parts
+    whole, gap = completed_limb(robot, chain, work.q[:, list(chain.joints)])
+    work.q[:, list(linked.joints)] = whole
+    status, open_ = parts["status"][:, row], gap > 0
+    beyond = (status == Status.CONVERGED) & ~linked.within(whole)
+    status[beyond] = Status.OUT_OF_LIMITS
+    status[open_] = Status.UNREACHABLE
+    for name in ("residual", "distance"):
+        parts[name][open_, row] = np.hypot(parts[name][open_, row], gap[open_])
+    parts["worst_joint"][:, row] = np.array(linked.joints)[
+        limits.worst_joint(whole, linked.lower, linked.upper)
+    ]
 
 
 def _fill(work: _Work, system: System, x: Array, iterations: Array, rows: Sequence[int]) -> None:

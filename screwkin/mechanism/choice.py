@@ -133,7 +133,7 @@ def _checked(robot: Robot, primary: Sequence[str] | None, added: tuple[VirtualCh
     """The parts of ``closed_mechanism`` besides the robot."""
     _check_names(robot, added)
     bare, q, T = unchosen(robot, added), reference_posture(robot), reference_base(robot)
-    _check_closed(bare, T, q)
+    check_closed(bare, T, q)
     N = referenced(bare, network_of_twists(bare, coupling_twists(bare, T, q)))
     mobility = len(bare.couplings) - int(rank(N))
     if primary is None:
@@ -171,7 +171,7 @@ def _check_names(robot: Robot, added: Sequence[VirtualChain]) -> None:
         taken.add(chain.name)
 
 
-def _check_closed(mechanism: Mechanism, T: Pose, q: Sequence[float]) -> None:
+def check_closed(mechanism: Mechanism, T: Pose, q: Sequence[float]) -> None:
     """The two ends of every closure and further chain coincide, to ``CLOSED`` times the size and in rad."""
     robot = mechanism.robot
     carried = dict(zip(robot.link_names, link_displacements(robot, list(q)), strict=True))

@@ -121,7 +121,16 @@ def _joint(row: JointRow) -> Joint:
     pitch = INFINITE if row.type == "prismatic" else row.pitch
     screw = Screw(row.s, row.s0, pitch)
     return Joint(
-        row.name, row.parent, row.child, row.type, screw, row.lower, row.upper, row.velocity, row.effort
+        row.name,
+        row.parent,
+        row.child,
+        row.type,
+        screw,
+        row.lower,
+        row.upper,
+        row.velocity,
+        row.effort,
+        passive=row.passive,
     )
 
 

@@ -80,7 +80,7 @@ def vars_of(robot: RobotRecord) -> dict[str, Any]:
 def _numeric(value: Any) -> Any:
     """The same records with 1.0 for every symbol: names and connections are left to be checked."""
     if is_dataclass(value) and not isinstance(value, type):
-        return type(value)(*(_numeric(getattr(value, f.name)) for f in fields(value)))
+        return type(value)(**{f.name: _numeric(getattr(value, f.name)) for f in fields(value)})
     if isinstance(value, tuple):
         return tuple(map(_numeric, value))
     if isinstance(value, dict):
@@ -140,6 +140,9 @@ def _misfits(value: Any, hint: Any, key: str) -> Iterator[tuple[str, str, str]]:
     if hint in (Scalar, float):
         if not isinstance(value, int | float | np.number) and not is_open(value):
             yield key, f"found {value!r}", "Give a number"
+    elif hint is bool:
+        if not isinstance(value, bool):
+            yield key, f"found {value!r}", "Give True or False"
     elif hint is str or get_origin(hint) is Literal:
         if not isinstance(value, str):
             yield key, f"found {value!r}", "Give a text"

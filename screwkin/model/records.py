@@ -90,7 +90,11 @@ class Link:
 
 @dataclass(frozen=True)
 class Joint:
-    """A screw joint between two links, with limits in rad (m for prismatic), rad/s and N m."""
+    """A screw joint between two links, with limits in rad (m for prismatic), rad/s and N m.
+
+    ``passive``: the table says that no motor turns it (which joints of a loop have motors where no table says
+    so: ``mechanism.actuation``).
+    """
 
     name: str
     parent: str
@@ -101,6 +105,7 @@ class Joint:
     upper: float
     velocity: float
     effort: float
+    passive: bool = field(default=False, kw_only=True)
 
 
 @dataclass(frozen=True)

@@ -126,6 +126,7 @@ class JointRow(Row):
     upper: Value = Field(math.inf, description="upper limit in rad or m")
     velocity: Positive = Field(math.inf, description="greatest speed in rad/s or m/s")
     effort: Positive = Field(math.inf, description="greatest torque or force in N m or N")
+    passive: bool = Field(False, description="true for a joint without a motor")
     mimic: MimicRow | None = Field(None, description='{ joint = "leader", ratio = 1.0, offset = 0.0 }')
 
 

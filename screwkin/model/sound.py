@@ -159,4 +159,5 @@ def _is_joint(joint: Joint) -> bool:
         "helical": pitch != 0 and math.isfinite(pitch),
     }[joint.type]
     ordered = joint.lower <= joint.upper and joint.lower < math.inf and joint.upper > -math.inf
-    return bool(fits and ordered and joint.velocity > 0 and joint.effort > 0)
+    bounded = joint.velocity > 0 and joint.effort > 0 and isinstance(joint.passive, bool)
+    return bool(fits and ordered and bounded)

@@ -155,6 +155,8 @@ def _joint(joint: Joint) -> dict[str, Any]:
         row["pitch"] = screw.pitch
     limits = {key: getattr(joint, key) for key in _UNLIMITED}
     row |= {key: x for key, x in limits.items() if x != _UNLIMITED[key]}
+    if joint.passive:
+        row["passive"] = True
     if isinstance(joint, CoupledJoint):
         row["mimic"] = coupling_of(joint)
     return row

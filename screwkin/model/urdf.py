@@ -175,7 +175,10 @@ def _refuse_what_urdf_cannot_say(robot: Robot) -> None:
         raise InputError(f"robot {robot.name}: URDF has no helical joints, but it has {', '.join(helical)}")
     loops = [closure.name for closure in robot.closures]
     if loops:
-        raise InputError(f"robot {robot.name}: URDF has no closed loops, but it has {', '.join(loops)}")
+        raise InputError(
+            f"robot {robot.name}: URDF has no closed loops, but it has {', '.join(loops)}: a URDF is a tree, "
+            "and a reader would let rods and cranks swing; give the table (.toml) itself"
+        )
 
 
 def _number(value: float) -> str:

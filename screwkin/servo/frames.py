@@ -35,7 +35,8 @@ def frames_of(bounds: Bounds, trajectory: Trajectory, rate: float = 50.0) -> Fra
         raise InputError(f"rate {rate!r} Hz is not a rate to play at; expected 1 to 1000, such as 50")
     count = math.ceil(trajectory.duration * rate - 1e-9) + 1
     time = np.minimum(np.arange(count) / rate, trajectory.duration)
-    q = trajectory.sampled(trajectory.time[0] + time)[0]
+    columns = [trajectory.joint_names.index(name) for name in bounds.names]
+    q = trajectory.sampled(trajectory.time[0] + time)[0][:, columns]
     bounds.ticks(q)
     steps = np.abs(np.diff(q, axis=0)) * rate
     if (steps > bounds.rate).any():

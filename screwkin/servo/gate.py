@@ -39,7 +39,7 @@ class Writer(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Bounds:
-    """What may be written to each of n servos, in the order of the robot's joints.
+    """What may be written to each of n servos, in the order of the robot's joints with motors.
 
     profiles, names, ids (n,); scale (n,) [rad per tick, signed], zero (n,) [ticks]: q = scale (tick - zero);
     lower, upper (n,): ends of the positions [ticks, exact]; rate (n,) [rad/s]; speed and torque (n,): the
@@ -75,29 +75,28 @@ class Bounds:
         profiles = tuple(servo.profile for servo in mounted)
         scale = np.array([servo.direction * servo.profile.tick for servo in mounted])
         zero = np.array([servo.profile.centre + servo.zero / servo.profile.tick for servo in mounted])
-        joints = limited_joints(robot)
+        limited = {joint.name: joint for joint in limited_joints(robot)}
+        joints = [limited[servo.joint] for servo in mounted]
         limits = np.array([[joint.lower, joint.upper] for joint in joints])
         ends = np.sort(limits / scale[:, None] + zero[:, None], axis=1)
         last = np.array([profile.ticks - 1 for profile in profiles])
         lower, upper = np.maximum(ends[:, 0], 0), np.minimum(ends[:, 1], last)
         if not (np.ceil(lower) <= np.floor(upper)).all():
             k = int((np.ceil(lower) > np.floor(upper)).argmax())
-            raise SafetyError(
-                f"{robot.joint_names[k]}: its limits lie outside the range of servo {mounted[k].id}"
-            )
+            raise SafetyError(f"{joints[k].name}: its limits lie outside the range of servo {mounted[k].id}")
         pairs = list(zip(joints, profiles, strict=True))
         rate = np.array([min(joint.velocity, profile.no_load_speed) for joint, profile in pairs])
         speed = rate / [profile.speed_unit for profile in profiles]
         if not (speed >= 1).all():
             k = int((speed < 1).argmax())
             raise SafetyError(
-                f"{robot.joint_names[k]}: {rate[k]:.4g} rad/s is less than its servo's smallest speed"
+                f"{joints[k].name}: {rate[k]:.4g} rad/s is less than its servo's smallest speed"
             )
         most = [profile.register("moving_speed").high for profile in profiles]
         share = [torque * min(1.0, joint.effort / profile.stall_torque) for joint, profile in pairs]
         full = [profile.register("torque_limit").high for profile in profiles]
         return cls(
-            names=robot.joint_names,
+            names=tuple(joint.name for joint in joints),
             ids=tuple(servo.id for servo in mounted),
             profiles=profiles,
             scale=scale,

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
@@ -25,6 +25,7 @@ from typing import Any
 
 from screwkin.errors import Fault, InputError, TableError, UnknownNameError
 from screwkin.files import text_sha256
+from screwkin.mechanism.linkages import motor_joints
 from screwkin.model.robot import Robot
 from screwkin.motors.library import IN_SERVOS, has_motor, table_folder
 from screwkin.servo.packets import ProtocolName
@@ -92,7 +93,7 @@ class ServoJoint:
 
 @dataclass(frozen=True)
 class ServoMap:
-    """The servos of a robot in the order of its joints, all on one bus."""
+    """The servos of a robot in the order of its joints with motors, all on one bus."""
 
     robot: str
     protocol: ProtocolName
@@ -106,9 +107,10 @@ class ServoMap:
         Raises:
             TableError: every fault of the section at once, each with the key and what would be right.
         """
-        folder = table_folder(robot)
-        faults, profiles = list(_faults(robot.joint_names, robot.servos, folder)), {}
-        for joint in robot.joint_names:
+        folder, driven = table_folder(robot), motor_joints(robot)
+        passive = [name for name in robot.joint_names if name not in driven]
+        faults, profiles = list(_faults(driven, passive, robot.servos, folder)), {}
+        for joint in driven:
             try:
                 profiles[joint] = _profile_of(robot.servos, joint, folder)
             except InputError:
@@ -128,7 +130,7 @@ class ServoMap:
                 float(s.get("zero", {}).get(name, 0.0)),
                 profiles[name],
             )
-            for name in robot.joint_names
+            for name in driven
         )
         return cls(robot.name, protocols.pop(), int(s.get("baud", DEFAULT_BAUD)), joints)
 
@@ -180,8 +182,10 @@ def _profile_of(servos: Mapping[str, Any], joint: str, folder: Path | None) -> P
     return replace(profile, range_deg=float(degrees)) if _is_number(degrees) else profile
 
 
-def _faults(names: tuple[str, ...], servos: Mapping[str, Any], folder: Path | None) -> Iterator[Fault]:
-    """Faults of the section's own keys and values."""
+def _faults(
+    names: tuple[str, ...], passive: Sequence[str], servos: Mapping[str, Any], folder: Path | None
+) -> Iterator[Fault]:
+    """Faults of the section's own keys and values; ``names`` are the joints with motors."""
     if not servos:
         yield Fault("[servos]", "", "is missing", "Write at least model and ids there")
         return
@@ -202,7 +206,7 @@ def _faults(names: tuple[str, ...], servos: Mapping[str, Any], folder: Path | No
             yield Fault("[servos]", key, f"{table!r} is no table", fix)
         else:
             yield from (
-                Fault("[servos]", f"{key}.{joint}", "is no joint", f"Joints are {', '.join(names)}")
+                Fault("[servos]", f"{key}.{joint}", *_no_motor(joint, passive, names))
                 for joint in table
                 if joint not in names
             )
@@ -210,6 +214,13 @@ def _faults(names: tuple[str, ...], servos: Mapping[str, Any], folder: Path | No
     degrees = servos.get("range_deg", 300.0)
     if not (_is_number(degrees) and 0 < degrees <= 360):
         yield Fault("[servos]", "range_deg", f"is {degrees!r}", "Write a number of degrees up to 360")
+
+
+def _no_motor(joint: str, passive: Sequence[str], names: tuple[str, ...]) -> tuple[str, str]:
+    """What is wrong with a joint that has no motor, and what would be right."""
+    if joint in passive:
+        return "is turned by no motor", f"Joints with motors are {', '.join(names)}"
+    return "is no joint", f"Joints are {', '.join(names)}"
 
 
 def _id_faults(names: tuple[str, ...], ids: Mapping[str, Any]) -> Iterator[Fault]:

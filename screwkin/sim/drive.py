@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from screwkin.algebra.arrays import Array
+from screwkin.mechanism.linkages import motor_joints
 from screwkin.model.robot import Robot
 from screwkin.sim.backend import Command
 
@@ -32,6 +33,16 @@ class Actuation:
     torque: Array
     rate: Array
     bound: Array
+
+    def on(self, motors: Array) -> Actuation:
+        """The same on the joints that have motors, given as (n,) bool; nothing on the others."""
+        return Actuation(np.where(motors, self.torque, 0.0), self.rate, np.where(motors, self.bound, 0.0))
+
+
+def motored(robot: Robot) -> Array:
+    """(n,) bool: the joints that have motors."""
+    driven = motor_joints(robot)
+    return np.array([name in driven for name in robot.joint_names], dtype=bool)
 
 
 class Servos(Protocol):

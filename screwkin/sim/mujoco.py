@@ -28,7 +28,8 @@ from screwkin.model.state import State
 from screwkin.sim.backend import Command, Contact, Observation, moment_about_origin
 from screwkin.sim.bodies import Body, bodies_of
 from screwkin.sim.couplings import STIFFEST, couple_in_mujoco
-from screwkin.sim.drive import UNLIMITED, RigidServos, Servos
+from screwkin.sim.drive import UNLIMITED, RigidServos, Servos, motored
+from screwkin.sim.loops import close_in_mujoco
 
 CORNER = 1e-4
 """Radius [m] of the spheres that stand for the corners of a sole that no box has."""
@@ -90,6 +91,7 @@ class MuJoCoBackend:
         self.dt = self._physics.dt
         self._servos = servos or RigidServos(robot)
         self.servo = self._servos.name
+        self._motored = motored(robot)
         self._mj = mj = mujoco_library()
         bodies, remarks = bodies_of(robot)
         self.settings: Mapping[str, Any] = {
@@ -97,8 +99,9 @@ class MuJoCoBackend:
             "remarks": [*remarks, *(f"inertia balanced of {name}" for name in _unbalanced(robot))],
         }
         spec = _world(mj, self._physics)
-        _add_bodies(mj, spec, robot, bodies, self._servos.rotor_inertia)
-        _add_closures(mj, spec, robot, bodies)
+        _add_bodies(mj, spec, robot, bodies, self._servos.rotor_inertia * self._motored)
+        ends = {body.link.name: (spec.body(_body_name(body.link.name)), body) for body in bodies}
+        close_in_mujoco(mj, spec, robot, ends)
         couple_in_mujoco(mj, spec, robot)
         self.model = spec.compile()
         self.data = mj.MjData(self.model)
@@ -144,7 +147,7 @@ class MuJoCoBackend:
         """Let one step pass under a command."""
         mj, model, data = self._mj, self.model, self.data
         q, qd = data.qpos[self._qpos], data.qvel[self._dof]
-        action = self._servos.actuate(q, qd, self._motor, command, self.dt)
+        action = self._servos.actuate(q, qd, self._motor, command, self.dt).on(self._motored)
         model.dof_frictionloss[self._dof] = np.minimum(action.bound, UNLIMITED)
         mj.mj_step1(model, data)
         data.qfrc_applied[self._dof] = action.torque
@@ -314,28 +317,6 @@ def _bare_corners(robot: Robot, body: Body) -> list[Array]:
         up = up / np.linalg.norm(up)
         bare += [body.to_frame[:3, :3] @ (p + CORNER * up) + body.to_frame[:3, 3] for p in missing]
     return bare
-
-
-def _add_closures(mj: Any, spec: Any, robot: Robot, bodies: tuple[Body, ...]) -> None:
-    """Two frames on two links that are welded, for every loop of the table."""
-    frames = {body.link.name: body for body in bodies}
-    for closure in robot.closures:
-        ends = ((closure.link_a, closure.frame_a), (closure.link_b, closure.frame_b))
-        names = []
-        for side, (link, frame) in zip("ab", ends, strict=True):
-            T = frames[link].pose(frame)
-            name = f"{closure.name} {side}"
-            spec.body(_body_name(link)).add_site(name=name, pos=T[:3, 3], quat=_quat(mj, T))
-            names.append(name)
-        spec.add_equality(
-            name=closure.name,
-            type=mj.mjtEq.mjEQ_WELD,
-            objtype=mj.mjtObj.mjOBJ_SITE,
-            name1=names[0],
-            name2=names[1],
-            solref=[2e-3, 1.0],
-            solimp=[STIFFEST, STIFFEST, 1e-3, 0.5, 2.0],
-        )
 
 
 def _body_name(link: str) -> str:

@@ -29,7 +29,8 @@ from screwkin.model.urdf import urdf_frames, urdf_of_bodies
 from screwkin.sim.backend import Command, Contact, Observation, moment_about_origin
 from screwkin.sim.camera import Camera
 from screwkin.sim.couplings import couple_in_pybullet
-from screwkin.sim.drive import UNLIMITED, RigidServos, Servos
+from screwkin.sim.drive import UNLIMITED, RigidServos, Servos, motored
+from screwkin.sim.loops import close_in_pybullet, quat_xyzw
 from screwkin.sim.motors import MotorServos
 from screwkin.sim.quiet import quiet
 from screwkin.sim.rotors import RelativeRotors, with_rotors
@@ -92,14 +93,14 @@ class PyBulletBackend:
         """Connect and build the world.
 
         Args:
-            robot: an open tree.
+            robot: closures are welded.
             physics: see ``Physics``.
             gui: show a window.
             servos: of the joints; rigid by default.
 
         Raises:
             MissingDependencyError: pybullet is not installed.
-            InputError: the robot has loops or helical joints, a leg has nothing to stand on, soles cannot be
+            InputError: the robot has helical joints, a leg has nothing to stand on, soles cannot be
                 so elastic, or there is no display for ``gui``.
         """
         self._robot = robot
@@ -107,13 +108,16 @@ class PyBulletBackend:
         self.servo = self._servos.name
         self._physics = physics or Physics()
         _check_soles(self._physics)
-        if robot.coupled or self._physics.sole_stiffness is not None:
+        if robot.coupled or robot.closures or self._physics.sole_stiffness is not None:
             self._physics = replace(self._physics, solver="iterative")
         self.dt = self._physics.dt
         self.settings: Mapping[str, Any] = asdict(self._physics)
         _check_feet(robot)
-        steadied, rotors = not isinstance(self._servos, MotorServos), self._servos.rotor_inertia
-        urdf = urdf_of_bodies(with_rotors(robot.with_inertia_floor(), rotors, steadied))
+        self._motored = motored(robot)
+        rotors = self._servos.rotor_inertia * self._motored
+        steadied = not isinstance(self._servos, MotorServos)
+        opened = replace(robot.with_inertia_floor(), closures=())
+        urdf = urdf_of_bodies(with_rotors(opened, rotors, steadied))
         self._p = _imported_pybullet()
         self._client = _connected(self._p, gui)
         self._here = {"physicsClientId": self._client}
@@ -128,6 +132,7 @@ class PyBulletBackend:
         self._applied = np.zeros(len(self._joints))
         self._release()
         couple_in_pybullet(self._p, self._here, self._body, robot, self._tree)
+        close_in_pybullet(self._p, self._here, self._body, robot, self._link_names)
         self._rotors: RelativeRotors | None = None
         if not steadied:
             floats = robot.base == "floating"
@@ -239,7 +244,7 @@ class PyBulletBackend:
         """Place the robot at rest in a state, and time at 0."""
         p, here = self._p, self._here
         T = np.asarray(state.T_world_base, dtype=float) @ self._T_base_inertial
-        p.resetBasePositionAndOrientation(self._body, T[:3, 3].tolist(), _quat_xyzw(T[:3, :3]), **here)
+        p.resetBasePositionAndOrientation(self._body, T[:3, 3].tolist(), quat_xyzw(T[:3, :3]), **here)
         p.resetBaseVelocity(self._body, [0.0] * 3, [0.0] * 3, **here)
         positions = tree_positions(self._robot, np.asarray(state.q, dtype=float).tolist())
         for index, q in zip(self._tree, positions, strict=True):
@@ -267,7 +272,7 @@ class PyBulletBackend:
         states = p.getJointStates(self._body, self._joints, **here)
         q, qd = np.array([state[:2] for state in states]).T
         motor = np.array([state[3] for state in states])
-        action = self._servos.actuate(q, qd, motor, command, self.dt)
+        action = self._servos.actuate(q, qd, motor, command, self.dt).on(self._motored)
         p.setJointMotorControlArray(
             self._body,
             self._joints,
@@ -369,13 +374,6 @@ def _check_soles(physics: Physics) -> None:
         raise InputError(f"sole_stiffness is {k!r}; it must be a positive number in N/m, or None")
     if not (np.isfinite(d) and d >= 0):
         raise InputError(f"sole_damping is {d!r}; it must be a finite number of at least 0 in N s/m")
-
-
-def _quat_xyzw(R: Array) -> list[float]:
-    from scipy.spatial.transform import Rotation
-
-    quat: list[float] = Rotation.from_matrix(R).as_quat().tolist()
-    return quat
 
 
 def _imported_pybullet() -> Any:

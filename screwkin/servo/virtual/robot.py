@@ -19,7 +19,7 @@ def virtual_servos(
     return_delay: float = 0.0,
     changed: Mapping[str, float] | None = None,
 ) -> list[VirtualServo]:
-    """A virtual servo for every joint of a robot, in the order of its joints.
+    """A virtual servo for every joint of a robot that has a motor, in the order of its joints.
 
     Args:
         robot: with ``[servos]`` in its table.
@@ -44,7 +44,9 @@ def virtual_servos(
     if stiffness is not None or "stiffness" in robot.servos:
         springs = joint_stiffness(robot, stiffness).tolist()
     virtual = []
-    for servo, angle, spring in zip(servos.joints, q, springs, strict=True):
+    for servo in servos.joints:
+        place = robot.joint_names.index(servo.joint)
+        angle, spring = q[place], springs[place]
         servo.ticks_from_angle(angle)  # refused if it cannot stand there
         one = VirtualServo(
             servo.profile, servo.id, servo.direction * angle + servo.zero, spring, servos.baud, return_delay

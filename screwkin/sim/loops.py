@@ -1,0 +1,89 @@
+"""Loops in the engines: constraints that hold the two frames of every closure together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import Pose, as_array, pose_from_array
+from screwkin.model.robot import Robot
+from screwkin.model.urdf import urdf_frames
+from screwkin.sim.bodies import Body
+from screwkin.sim.couplings import STIFFEST
+from screwkin.sim.drive import UNLIMITED
+
+ERP = 0.2
+"""Share of a gap that PyBullet removes in one step."""
+
+
+def close_in_mujoco(mj: Any, spec: Any, robot: Robot, bodies: Mapping[str, tuple[Any, Body]]) -> None:
+    """A weld of two sites for every closure.
+
+    Args:
+        mj: the module of the engine.
+        spec: of a model that has all bodies of the robot.
+        robot: of numbers.
+        bodies: the engine's body and ours of every link at which a loop closes.
+    """
+    for closure in robot.closures:
+        ends = ((closure.link_a, closure.frame_a), (closure.link_b, closure.frame_b))
+        names = []
+        for side, (link, frame) in zip("ab", ends, strict=True):
+            element, body = bodies[link]
+            T, quat = body.pose(frame), np.zeros(4)
+            mj.mju_mat2Quat(quat, np.ascontiguousarray(T[:3, :3]).ravel())
+            names.append(f"{closure.name} {side}")
+            element.add_site(name=names[-1], pos=T[:3, 3], quat=quat)
+        spec.add_equality(
+            name=closure.name,
+            type=mj.mjtEq.mjEQ_WELD,
+            objtype=mj.mjtObj.mjOBJ_SITE,
+            name1=names[0],
+            name2=names[1],
+            solref=[2e-3, 1.0],
+            solimp=[STIFFEST, STIFFEST, 1e-3, 0.5, 2.0],
+        )
+
+
+def close_in_pybullet(
+    p: Any, client: Mapping[str, int], body: int, robot: Robot, links: Sequence[str]
+) -> None:
+    """A fixed joint for every closure.
+
+    Args:
+        p: the module of the engine.
+        client: the arguments that name its client.
+        body: index of the robot.
+        robot: of numbers.
+        links: names of the engine's links, the base first.
+    """
+    frames = urdf_frames(robot)
+
+    def end(link: str, frame: Pose) -> tuple[int, list[float], list[float]]:
+        """The engine's index of a link; position and quaternion of a frame from its inertial frame."""
+        index = links.index(link) - 1
+        info = p.getDynamicsInfo(body, index, **client)
+        inertial = np.eye(4)
+        inertial[:3, :3] = np.reshape(p.getMatrixFromQuaternion(info[4]), (3, 3))
+        inertial[:3, 3] = info[3]
+        T = as_array(pose_from_array(inertial).inverse @ (frames[link].inverse @ frame)).astype(float)
+        return index, T[:3, 3].tolist(), quat_xyzw(T[:3, :3])
+
+    for closure in robot.closures:
+        a, place_a, turn_a = end(closure.link_a, closure.frame_a)
+        b, place_b, turn_b = end(closure.link_b, closure.frame_b)
+        weld = p.createConstraint(
+            body, a, body, b, p.JOINT_FIXED, [0.0] * 3, place_a, place_b, turn_a, turn_b, **client
+        )
+        p.changeConstraint(weld, maxForce=UNLIMITED, erp=ERP, **client)
+
+
+def quat_xyzw(R: Array) -> list[float]:
+    """Quaternion (4,) of a rotation matrix (3, 3), as PyBullet orders it."""
+    from scipy.spatial.transform import Rotation
+
+    quat: list[float] = Rotation.from_matrix(R).as_quat().tolist()
+    return quat
