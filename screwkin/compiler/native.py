@@ -38,8 +38,11 @@ FLAGS = (
 """Fused multiply-adds and no errno, but IEEE arithmetic otherwise: NaN and infinity keep their meaning."""
 TUNED = ("-fschedule-insns", "-fsched-pressure")
 """Tried first, as not every compiler knows them: operations that wait for nothing move in front of others."""
-PATIENCE = 120.0
-"""Seconds after which a compiler is taken to hang, and ended; the largest programs take about a tenth."""
+PATIENCE = 600.0
+"""Seconds after which a compiler is taken to hang, and ended: fifty times what the largest programs take.
+
+A loaded machine may take a dozen times as long as an idle one, and must come to the same programs.
+"""
 SHARED_FROM = 1.5e6
 """Operations of a batch from which the processor's cores share it: starting a thread costs some 1e5."""
 
