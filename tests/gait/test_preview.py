@@ -10,7 +10,7 @@ from screwkin.gait.preview import follow_reference, preview_gains
 from screwkin.kinematics.mass import GRAVITY
 
 
-def test_gains_of_the_published_setting() -> None:
+def test_gains_of_a_setting_that_others_report() -> None:
     """T .02 s, CoM .43 m, Qe 1, R 1e-6, horizon 1.6 s: the figures that others report for these values."""
     gains = preview_gains(0.02, 0.43, 1.6)
     assert gains.Ks == pytest.approx(460.4127, abs=1e-3)
