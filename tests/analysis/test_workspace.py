@@ -19,8 +19,9 @@ from screwkin.errors import InputError, UnknownNameError
 from screwkin.model.robot import Robot
 
 BEFORE = {0.325: 705, 0.350: 753, 0.375: 722, 0.400: 734, 0.430: 191}
-"""Height [m] to area [cm^2], measured by other code: foot level, ankle 31 mm above the sole, limits of the paper's
-table 1. The paper itself prints no areas.
+"""Height [m] to area [cm^2], measured by other code; the paper prints no areas.
+
+Foot level, ankle 31 mm above the sole, limits of the paper's table 1.
 """
 
 
