@@ -113,6 +113,8 @@ def test_ticks_are_those_of_the_servo_map(name):
         q = bounds.within(q)
         ticks = bounds.ticks(q)
         assert ticks.tolist() == [s.ticks_from_angle(a) for s, a in zip(servo_map.joints, q, strict=True)]
+        each = [bounds.radians_of(k, tick) for k, tick in enumerate(ticks.tolist())]
+        np.testing.assert_allclose(each, bounds.radians(ticks), atol=1e-12)
         np.testing.assert_allclose(
             bounds.radians(ticks),
             [s.angle_from_ticks(t) for s, t in zip(servo_map.joints, ticks.tolist(), strict=True)],
@@ -192,3 +194,21 @@ def test_the_effort_of_a_joint_limits_the_torque_of_its_servo(torque):
     assert dict(bus.written(34, 2)) == {
         id: math.floor(1023 * torque * expected.get(id, 1.0)) for id in range(1, 19)
     }
+
+
+def test_staying_says_what_was_written_within_the_limits():
+    bounds, bus = Bounds.of(narrow(BIOLOID, lower=-1.0, upper=1.0)), Recorder()
+    assert Gate(bus, bounds).stay({3: 512, 4: 0, 5: 1023}) == {3: 512, 4: 317, 5: 707}
+    ids = dict(bus.written(30, 2))
+    assert ids == {bounds.ids[3]: 512, bounds.ids[4]: 317, bounds.ids[5]: 707}
+
+
+def test_after_staying_everywhere_the_next_goals_must_be_near_and_after_staying_in_part_the_last_ones_count():
+    bounds = Bounds.of(BIOLOID)
+    gate = Gate(Recorder(), bounds)
+    gate.stay(dict.fromkeys(range(18), 512))
+    with pytest.raises(SafetyError, match="too far from the last ones"):
+        gate.goals(np.full(18, 0.2), 0.02)
+    gate = Gate(Recorder(), bounds)
+    gate.stay({0: 512})
+    gate.goals(np.full(18, 0.2), 0.02)
