@@ -19,7 +19,7 @@ BEFORE = ("misconfigured", "twin")
 ALL_KINDS = (*KINDS, *OTHERS, *BEFORE)
 HARMLESS = ("noise", "stalled", "suspended", "clock", "interrupted", "blocked")
 """Kinds after which every servo hears and answers: whoever is called dead is alive."""
-SIGNALS = (signal.SIGINT, signal.SIGTERM)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 REGISTERS = (
     *({"angle_limit_low": 0, "angle_limit_high": 0}, {"angle_limit_high": 500}, {"angle_limit_low": 520}),
     *({"max_torque": 300}, {"shutdown": 0}, {"shutdown": 4}, {"status_level": 0}, {"status_level": 1}),
