@@ -60,7 +60,7 @@ class Rig:
         knee.body.lag = 1e9
         log, k = self.player.log, self.player.bounds.names.index("right_knee")
         goals = log.arrays({})["command"][-FRAMES_PER_WINDOW - 2 :, k] if log.frames else []
-        at = self.player.bounds.radians_of(k, knee._ticks(knee.body.output))
+        at = self.player.bounds.radians_of(k, knee.body.output / knee.profile.tick + knee.profile.centre)
         if len(goals) and np.isnan(self.off_since) and min(abs(at - goals)) > 0.27:
             self.off_since = time
 
