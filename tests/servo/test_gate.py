@@ -212,3 +212,21 @@ def test_after_staying_everywhere_the_next_goals_must_be_near_and_after_staying_
     gate = Gate(Recorder(), bounds)
     gate.stay({0: 512})
     gate.goals(np.full(18, 0.2), 0.02)
+
+
+def test_a_joint_that_turns_farther_than_its_servo_ends_at_the_last_tick():
+    bounds = Bounds.of(narrow(replace(BIOLOID, postures=()), lower=-3.1, upper=3.1))
+    assert (set(bounds.low.tolist()), set(bounds.high.tolist())) == ({0}, {1023})
+
+
+def test_registers_that_do_not_lie_side_by_side_go_in_packets_of_their_own():
+    """On an STS3215 the running time stands between goal and speed."""
+    servos = {**BIOLOID.servos, "model": "STS3215"}
+    servos.pop("protocol", None)
+    bus = Recorder()
+    bounds = Bounds.of(replace(BIOLOID, servos=servos))
+    Gate(bus, bounds).goals(np.zeros(18))
+    goal, speed = (bounds.profiles[0].register(name) for name in ("goal_position", "moving_speed"))
+    assert goal.end != speed.address
+    assert [id for id, _ in bus.written(goal.address, goal.width)] == list(bounds.ids)
+    assert [id for id, _ in bus.written(speed.address, speed.width)] == list(bounds.ids)
