@@ -115,7 +115,7 @@ def test_auto_is_every_installed_engine_that_can_simulate_what_is_asked(
     monkeypatch.setattr("importlib.util.find_spec", lambda name: name)
     assert engines_for("auto", robot, none) == ("pybullet", "mujoco")
     assert engines_for("auto", robot, soles) == ("pybullet",)
-    assert engines_for("auto", sk.load_robot("linkages/four-bar"), none) == ("mujoco",)
+    assert engines_for("auto", sk.load_robot("linkages/four-bar"), none) == ("pybullet", "mujoco")
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "pybullet" else name)
     assert engines_for("auto", robot, none) == ("mujoco",)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)

@@ -190,7 +190,7 @@ def test_errors_of_allocation_pass_through() -> None:
 
 def test_a_number_may_be_a_float() -> None:
     definition, robot = inverse_dynamics.definition, random_tree(0)
-    door = definition.door(robot, definition.inputs(robot, ("gravity",)), ())
+    door = definition.door(robot, definition.inputs(robot, ("gravity",)), (None,))
     shapes = [group.shape for group in door.program.inputs]
     arrays = [np.eye(4) if s == (4, 4) else 9.81 if s == () else np.full(s, 0.1) for s in shapes]
     call = machine_code(door.guarded).checked(LIMIT, lambda batch: None)

@@ -153,17 +153,6 @@ def test_wrong_kinds_are_refused_in_words() -> None:
         sk.network_matrix(42, sk.home(robot))
 
 
-def test_robots_with_loops_are_refused_where_only_their_tree_would_be_seen() -> None:
-    robot = sk.load_robot("linkages/four-bar")
-    state, rest = sk.home(robot), np.zeros(len(robot.joints))
-    for ask in (
-        lambda: sk.mass_matrix(robot, state),
-        lambda: sk.inverse_dynamics(robot, state, rest, rest),
-    ):
-        with pytest.raises(InputError, match=r"closures \(loop\).*secondary_rates"):
-            ask()
-
-
 def test_a_search_over_robots_keeps_neither_robots_nor_programs() -> None:
     for calls, count in ((1, 1), (2, 2000)):
         robot = replace(random_tree(3))

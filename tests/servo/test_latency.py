@@ -34,6 +34,11 @@ FRAMES_PER_WINDOW = 5  # of 0.02 s in 0.1 s
 
 
 @cache
+def in_campaigns(*values):
+    """Values of a test whose kind others show already: they are tried in campaigns."""
+    return pytest.param(*values, marks=pytest.mark.slow)
+
+
 def steps() -> Trajectory:
     return walk(ROBOT, load_gait("smooth"), 1)
 
@@ -74,7 +79,7 @@ class Rig:
         return {servo.get("torque_enable") for servo in self.line.servos}
 
 
-@pytest.mark.parametrize("adapter", [0.0, 0.001, 0.008])
+@pytest.mark.parametrize("adapter", [in_campaigns(0.0), in_campaigns(0.001), 0.008])
 def test_a_healthy_play_behind_a_quick_adapter_finishes_with_all_servos_confirmed(adapter):
     rig = Rig(adapter)
     outcome = rig.player.play(steps())
@@ -84,7 +89,7 @@ def test_a_healthy_play_behind_a_quick_adapter_finishes_with_all_servos_confirme
     assert rig.gaps <= 0.25
 
 
-@pytest.mark.parametrize("adapter", [0.009, 0.016, 0.034, 0.040])
+@pytest.mark.parametrize("adapter", [0.009, in_campaigns(0.016), in_campaigns(0.034), 0.040])
 def test_a_slow_adapter_is_refused_beforehand_and_latency_timer_is_named(adapter):
     rig = Rig(adapter)
     with pytest.raises(SafetyError, match="latency_timer") as refusal:
@@ -94,7 +99,9 @@ def test_a_slow_adapter_is_refused_beforehand_and_latency_timer_is_named(adapter
     assert rig.torque() == {0}
 
 
-@pytest.mark.parametrize(("adapter", "model"), [(0.016, "MX-28"), (0.016, "MX-28-2"), (0.009, "MX-28-2")])
+@pytest.mark.parametrize(
+    ("adapter", "model"), [in_campaigns(0.016, "MX-28"), (0.016, "MX-28-2"), in_campaigns(0.009, "MX-28-2")]
+)
 def test_servos_that_are_read_together_play_behind_a_slow_adapter(adapter, model):
     rig = Rig(adapter, model=model)
     outcome = rig.player.play(steps())
@@ -110,7 +117,7 @@ def test_who_accepts_to_notice_later_plays_behind_an_adapter_as_it_is_sold():
     assert (outcome.final.state, outcome.final.unconfirmed) == ("hold", ())
 
 
-@pytest.mark.parametrize("blocked_at", [1.6, 2.4])
+@pytest.mark.parametrize("blocked_at", [1.6, in_campaigns(2.4)])
 @pytest.mark.parametrize(("adapter", "model"), [(0.001, "AX-12A"), (0.008, "AX-12A"), (0.016, "MX-28-2")])
 def test_a_blocked_knee_is_noticed_within_half_a_second(adapter, model, blocked_at):
     rig = Rig(adapter, model=model)

@@ -169,7 +169,7 @@ def test_loops_stay_closed_while_a_servo_drives_them(name: str) -> None:
     robot = weighty(sk.load_robot(name))
     first = robot.joint_names[0]
     limp = replace(
-        robot, joints=tuple(j if j.name == first else replace(j, effort=1e-12) for j in robot.joints)
+        robot, joints=tuple(j if j.name == first else replace(j, passive=True) for j in robot.joints)
     )
     home = sk.State(np.eye(4), np.array(robot.posture("home").q))
     backend = MuJoCoBackend(limp)
