@@ -17,6 +17,7 @@ from screwkin.errors import NoSolutionError, ScrewkinError
 from screwkin.gait.coarse import coarse_walks
 from screwkin.gait.driven import arms_of
 from screwkin.gait.follow import follow
+from screwkin.gait.footsteps import listed_step
 from screwkin.gait.lengths import lengths_of, stretched
 from screwkin.gait.record import Gait
 from screwkin.model.robot import Robot
@@ -52,7 +53,7 @@ def _listed(error: NoSolutionError, gait: Gait) -> str:
     sample = getattr(error, "sample", -1)
     if sample < 0:
         return "Move the footholds that the message names"
-    n = min(max(math.floor(sample / (gait.rate * gait.Tc)) - 1, 0), len(gait.places) - 1)
+    n = listed_step(gait, sample / gait.rate)
     place = gait.places[n]
     where = f"x {place.x:g}, y {place.y:g} m, yaw {math.degrees(math.remainder(place.yaw, math.tau)):.4g} deg"
     nearer = f"bring it nearer, or lower waist_height = {gait.waist_height:g}"

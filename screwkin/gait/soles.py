@@ -7,6 +7,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.dynamics.support import convex_hull
 from screwkin.errors import NoSolutionError
+from screwkin.gait.footsteps import listed_step
 from screwkin.gait.motion import Motion
 from screwkin.gait.record import Gait
 from screwkin.gait.stance import Stance
@@ -69,8 +70,8 @@ def check_soles(gait: Gait, stance: Stance, feet: dict[str, Motion], time: Array
 
 def _advice(gait: Gait, time: float) -> str:
     if gait.places:
-        n = min(max(int(time / gait.Tc) - 1, 0), len(gait.places) - 1)
-        return f"This is in step {n + 1}: move its foothold, or the ones before and after it, apart"
+        step = listed_step(gait, time) + 1
+        return f"This is in step {step}: move its foothold, or the ones before and after it, apart"
     towards = gait.side if gait.side != 0 else gait.turn
     wanted = "left" if towards > 0 else "right"
     if gait.footholds == "close" and towards != 0 and gait.first != wanted:

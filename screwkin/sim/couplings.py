@@ -10,6 +10,11 @@ from screwkin.sim.drive import POSITION_GAIN, UNLIMITED
 
 STIFFEST = 0.9999
 """Largest impedance of a constraint that MuJoCo takes: the share of it that is not regularised away."""
+STIFF: Mapping[str, list[float]] = {
+    "solref": [2e-3, 1.0],
+    "solimp": [STIFFEST, STIFFEST, 1e-3, 0.5, 2.0],
+}
+"""How stiff MuJoCo's constraints of couplings and loops are: time constant [s] and damping, impedance."""
 
 
 def couple_in_pybullet(
@@ -55,7 +60,6 @@ def couple_in_mujoco(mj: Any, spec: Any, robot: Robot) -> None:
             objtype=mj.mjtObj.mjOBJ_JOINT,
             name1=joint.name,
             name2=joint.leader,
-            solref=[2e-3, 1.0],
-            solimp=[STIFFEST, STIFFEST, 1e-3, 0.5, 2.0],
+            **STIFF,
         )
         equality.data[:5] = [joint.offset, joint.ratio, 0.0, 0.0, 0.0]

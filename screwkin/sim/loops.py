@@ -12,7 +12,7 @@ from screwkin.algebra.se3 import Pose, as_array, pose_from_array
 from screwkin.model.robot import Robot
 from screwkin.model.urdf import urdf_frames
 from screwkin.sim.bodies import Body
-from screwkin.sim.couplings import STIFFEST
+from screwkin.sim.couplings import STIFF
 from screwkin.sim.drive import UNLIMITED
 
 ERP = 0.2
@@ -43,8 +43,7 @@ def close_in_mujoco(mj: Any, spec: Any, robot: Robot, bodies: Mapping[str, tuple
             objtype=mj.mjtObj.mjOBJ_SITE,
             name1=names[0],
             name2=names[1],
-            solref=[2e-3, 1.0],
-            solimp=[STIFFEST, STIFFEST, 1e-3, 0.5, 2.0],
+            **STIFF,
         )
 
 

@@ -27,7 +27,7 @@ from screwkin.model.robot import Joint, Robot
 from screwkin.model.state import State
 from screwkin.sim.backend import Command, Contact, Observation, moment_about_origin
 from screwkin.sim.bodies import Body, bodies_of
-from screwkin.sim.couplings import STIFFEST, couple_in_mujoco
+from screwkin.sim.couplings import STIFF, couple_in_mujoco
 from screwkin.sim.drive import UNLIMITED, RigidServos, Servos, motored
 from screwkin.sim.loops import close_in_mujoco
 
@@ -298,7 +298,7 @@ def _add_joint(mj: Any, element: Any, body: Body, joint: Joint, rotor: float) ->
         limited=bool(np.isfinite([joint.lower, joint.upper]).any()),
         range=limits,
         armature=rotor,
-        solimp_friction=[STIFFEST, STIFFEST, 1e-3, 0.5, 2.0],
+        solimp_friction=STIFF["solimp"],
     )
 
 
