@@ -158,7 +158,7 @@ def _rate_kernels(robot: Robot, given: Motion) -> Contestants:
 
     fused, called = (
         _jax(program, flat, made, first)
-        for made, first in ((emit_jax.function(program), False), (xla_call.function(program), True))
+        for made, first in ((emit_jax.function(program), False), (xla_call.xla_function(program), True))
     )
     return contestants | {
         f"{NAME}, JAX fused by XLA, all cores": fused,

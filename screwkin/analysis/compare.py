@@ -117,7 +117,7 @@ def compare_models(robot: Robot, samples: int = 1000, rounds: int = 21, seed: in
     models = support_models(robot, chains)
     rng, length = np.random.default_rng(seed), characteristic_length(robot)
     q = random_positions(robot, samples, rng)
-    fk, jacobian = differences(chains, models, q)
+    fk, jacobian = largest_differences(chains, models, q)
     times = _times(chains, random_positions(robot, BATCH, rng), rounds)
     return Comparison(
         robot=robot.name,
@@ -153,7 +153,7 @@ def _of(chain: ModelChain, q: Array) -> list[Array]:
     return [q[..., i] for i in chain.joints]
 
 
-def differences(
+def largest_differences(
     chains: Sequence[ModelChain], models: Mapping[str, Sequence[DHTable]], q: Array
 ) -> tuple[float, float]:
     """Largest difference of an entry of tip poses and of Jacobians between the models [1 and m].

@@ -114,7 +114,7 @@ def ik_study(
     rows, total = [], len(sets) * (len(entries) + len(OTHERS))
     for k, (data, target) in enumerate(sets):
         for i, entry in enumerate(entries):
-            rows.append(measured(chain, data, target, entry))
+            rows.append(measured_row(chain, data, target, entry))
             progress((k * total / len(sets) + i + 1) / total)
         for i, (name, start, solve) in enumerate(OTHERS):
             some = target if data == "gait" else target[:OTHERS_POSES]
@@ -155,7 +155,7 @@ def _fits(recognise: Callable[[SerialChain], object], chain: SerialChain) -> boo
     return True
 
 
-def measured(chain: SerialChain, data: str, target: Array, entry: Entry) -> IkRow:
+def measured_row(chain: SerialChain, data: str, target: Array, entry: Entry) -> IkRow:
     """The row of one method on targets (B, 4, 4)."""
     count = len(target)
     start = np.zeros((count, len(chain.names)))

@@ -23,7 +23,7 @@ from screwkin.servo.line import BusError, LineLostError
 from screwkin.servo.packets import ProtocolName
 from screwkin.servo.profiles import load_profile
 from screwkin.servo.protocols import protocol_named
-from screwkin.servo.roundtrip import RoundTrip, first_patience, latency_advice, measured
+from screwkin.servo.roundtrip import RoundTrip, first_patience, latency_advice, measured_round_trips
 from screwkin.servo.servo_map import ServoMap
 from screwkin.servo.survey import (
     BAUDS,
@@ -103,7 +103,9 @@ def _examined(
         mute = {one.id for one in apart if one.register in ("id", "status_level")}
         asked = [bounds.ids[k] for k in chosen if bounds.ids[k] not in mute]
         try:
-            return apart, measured(bus, asked, place.address, place.width, _SCANNED) if asked else None
+            return apart, measured_round_trips(
+                bus, asked, place.address, place.width, _SCANNED
+            ) if asked else None
         except LineLostError:
             raise
         except BusError as error:

@@ -10,7 +10,7 @@ import numpy as np
 import typer
 
 from screwkin.algebra.arrays import Array
-from screwkin.cli.forces_along import FRICTION, VALIDATED, Wanted, forces_along
+from screwkin.cli.forces_along import FRICTION, VALIDATED, ForceSettings, forces_along
 from screwkin.cli.options import AsJson, OutputFolder, assignment, assignments, numbers_of
 from screwkin.cli.output import aligned, print_json
 from screwkin.errors import InputError
@@ -93,7 +93,7 @@ def forces(
         if pull and friction is not None:
             raise InputError("--pull is without friction; leave out one of --pull and --friction")
         limit = None if pull else FRICTION if friction is None else friction
-        return forces_along(Path(robot), Wanted(limit, engine or VALIDATED, plots, output, as_json))
+        return forces_along(Path(robot), ForceSettings(limit, engine or VALIDATED, plots, output, as_json))
     _refuse(of_trajectory, f"for a trajectory.npz, and {robot} is none")
     if symbolic:
         numbers = of_robot.keys() - {"--load", "--active"}

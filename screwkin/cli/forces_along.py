@@ -25,7 +25,7 @@ FRICTION = 0.8
 
 
 @dataclass(frozen=True)
-class Wanted:
+class ForceSettings:
     """Limits of the floor, what to simulate beside, and what to write.
 
     friction: None, where the floor may pull too. engine: a simulator's name, ``none``, or ``validated``: that
@@ -39,7 +39,7 @@ class Wanted:
     as_json: bool = False
 
 
-def forces_along(path: Path, wanted: Wanted) -> int:
+def forces_along(path: Path, wanted: ForceSettings) -> int:
     """Write forces.npz and pictures of a trajectory's forces, and print the largest ones."""
     trajectory = load_trajectory(path)
     account = account_of(recorded_robot(trajectory, str(path)), trajectory)

@@ -82,7 +82,7 @@ def reached_maps(
     """
     name = first_leg(robot) if limb is None else limb
     with progress_bar("workspace") as done:
-        maps = maps_of(robot, name, numbers(heights, "--heights"), resolution, done)
+        maps = maps_of(robot, name, listed_numbers(heights, "--heights"), resolution, done)
     if not any(place.area for place in maps):
         listed = ", ".join(f"{place.height:g}" for place in maps)
         raise UnreachableError(
@@ -105,7 +105,7 @@ def first_leg(robot: Robot) -> str:
     raise InputError(f"{robot.name} has no leg; name a limb of six joints or more by --limb")
 
 
-def numbers(text: str | None, option: str) -> list[float] | None:
+def listed_numbers(text: str | None, option: str) -> list[float] | None:
     """Finite numbers separated by commas.
 
     Raises:

@@ -25,7 +25,7 @@ from screwkin.compiler.program import Group, Program, kept_with
 
 
 @kept_with
-def function(program: Program) -> Callable[..., tuple[Array, ...]]:
+def xla_function(program: Program) -> Callable[..., tuple[Array, ...]]:
     """The program as a function of its inputs, arrays (*batch, *shape), to its outputs, likewise.
 
     Machine code where the arrays are float64 on a processor that has it, ``emit_jax.function`` elsewhere.
@@ -72,7 +72,7 @@ def run(program: Program, inputs: Mapping[str, Any]) -> dict[str, Any]:
 
 @kept_with
 def _jitted(program: Program) -> Callable[..., tuple[Array, ...]]:
-    jitted: Callable[..., tuple[Array, ...]] = jax.jit(function(program))
+    jitted: Callable[..., tuple[Array, ...]] = jax.jit(xla_function(program))
     return jitted
 
 

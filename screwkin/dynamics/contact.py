@@ -117,7 +117,7 @@ def _sums(rows: Iterable[Sequence[Scalar]]) -> list[Scalar]:
     return total
 
 
-def shared(carriers: Sequence[_Carrier], needed: Wrench) -> tuple[list[Wrench], Scalar]:
+def shared_wrench(carriers: Sequence[_Carrier], needed: Wrench) -> tuple[list[Wrench], Scalar]:
     """The carriers' wrenches at their tips that sum to one about the base origin, and how spread they are.
 
     The spread is 1 for points all around, 0 where they are in line or none carries.
@@ -193,7 +193,7 @@ def contact_distribution(
     left = sum(needed.values(), NO_WRENCH)
     for carrier, wish in zip(carriers, wished, strict=True):
         left = left - wrench_at(-carrier.tip, wish)
-    more, spread = shared(carriers, left)
+    more, spread = shared_wrench(carriers, left)
     wrenches = [wish + extra for wish, extra in zip(wished, more, strict=True)]
     for carrier, wrench in zip(carriers, wrenches, strict=True):
         needed[carrier.link] = needed[carrier.link] - wrench_at(-carrier.tip, wrench)

@@ -9,7 +9,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.errors import SingularError
 from screwkin.ik.dead_points import dead_point_room
-from screwkin.ik.linkage import completed
+from screwkin.ik.linkage import with_followers
 from screwkin.mechanism.linkages import Linkage, linkages
 from screwkin.model.robot import Robot
 
@@ -41,7 +41,7 @@ def _notes(robot: Robot, linkage: Linkage, time: Array, q: Array) -> Iterator[st
     step = np.abs(np.diff(q[:, leads], axis=0)).max(axis=1, initial=0.0)
     for k in np.flatnonzero(np.minimum(room[:-1], room[1:]) < step):
         share = np.linspace(0, 1, BETWEEN + 2)[1:-1, None]
-        way = completed(robot, linkage, q[k] + share * (q[k + 1] - q[k])).q
+        way = with_followers(robot, linkage, q[k] + share * (q[k + 1] - q[k])).q
         room[k] = min(room[k], float(dead_point_room(robot, linkage, way).min()))
     sample = int(np.argmin(room))
     limb = linkage.limb or robot.name

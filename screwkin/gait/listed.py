@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from screwkin.errors import Fault, GaitError, InputError, near
-from screwkin.gait.places import KEYS, Place, read_places
+from screwkin.gait.places import KEYS, StepEnd, read_places
 from screwkin.gait.record import CHOICES, Gait, Side, gait_from_dict
 from screwkin.model.toml import read_text
 
@@ -25,7 +25,7 @@ class Footsteps:
     places: of the foot that swings, in the world. first: the foot that swings first.
     """
 
-    places: tuple[Place, ...]
+    places: tuple[StepEnd, ...]
     first: Side = "right"
 
     def __len__(self) -> int:

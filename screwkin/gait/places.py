@@ -15,7 +15,7 @@ KEYS = ("x", "y", "yaw")
 
 
 @dataclass(frozen=True)
-class Place:
+class StepEnd:
     """Where a step ends: x, y [m] and yaw [rad] of the foot that swings, in the world."""
 
     x: float
@@ -25,7 +25,7 @@ class Place:
 
 def read_places(
     rows: Any, numbers: Mapping[str, float | None], unknown: frozenset[str], faults: list[Fault]
-) -> tuple[Place, ...]:
+) -> tuple[StepEnd, ...]:
     """The rows ``[[foothold]]`` of a gait.
 
     Args:
@@ -47,7 +47,7 @@ def read_places(
                 faults.append(Fault(name, key, "unknown key", fix))
         values = [_number(name, key, row, numbers, unknown, faults) for key in KEYS]
         if None not in values:
-            places.append(Place(*(float(value) for value in values if value is not None)))
+            places.append(StepEnd(*(float(value) for value in values if value is not None)))
     return tuple(places)
 
 

@@ -16,7 +16,7 @@ from typing import Any, Literal, cast
 from screwkin.errors import Fault, GaitError, near
 from screwkin.gait.free_path import read_free_waist
 from screwkin.gait.keypoints import CHANNELS, Channel, channel_faults, increases, read_channel
-from screwkin.gait.places import Place, read_places
+from screwkin.gait.places import StepEnd, read_places
 from screwkin.gait.relative import FREE, NOMINAL, read_lengths, relative_to_robot
 from screwkin.gait.settings import place, valid_keys
 from screwkin.model.expression import names_in, resolve_parameters
@@ -105,7 +105,7 @@ class Gait:
     channels: Mapping[str, Channel]
     waist: Mapping[str, tuple[float, ...]]
     lengths: Mapping[str, float] = field(default_factory=dict)
-    places: tuple[Place, ...] = ()
+    places: tuple[StepEnd, ...] = ()
     path: str = ""
     _document: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
@@ -198,7 +198,7 @@ def _places(
     numbers: dict[str, float | None],
     unknown: frozenset[str],
     faults: list[Fault],
-) -> tuple[Place, ...]:
+) -> tuple[StepEnd, ...]:
     """Footholds of a gait that lists them; their number is that of the steps."""
     listed = flat["kind"] == "footsteps"
     if _LISTED not in document:

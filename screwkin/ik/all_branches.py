@@ -19,7 +19,7 @@ from screwkin.ik.on_limits import on_limits
 from screwkin.ik.polish import from_guess, iterated, steps
 from screwkin.ik.relative import relative
 from screwkin.ik.solutions import LimbSolutions, ordered
-from screwkin.kinematics.serial_chain import SerialChain, cached, residual
+from screwkin.kinematics.serial_chain import SerialChain, per_chain, residual
 from screwkin.model.records import LIMIT_TOLERANCE
 
 FOLD = 0.01
@@ -103,7 +103,7 @@ def _both_sides(chain: SerialChain, q: Array, target: Array) -> tuple[Array, Arr
     return q + step, q - step
 
 
-@cached
+@per_chain
 def relative_branches(chain: SerialChain) -> Program:
     """All branches of the limb's relative."""
     form = relative(chain)

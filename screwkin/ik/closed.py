@@ -19,7 +19,7 @@ from screwkin.errors import InputError
 from screwkin.ik import parallel_axes, point_limb, spherical_hip
 from screwkin.ik.family import Branch, Family, Formulas
 from screwkin.ik.starts import box, spread
-from screwkin.kinematics.serial_chain import SerialChain, cached, distance, residual, target_of, volume
+from screwkin.kinematics.serial_chain import SerialChain, distance, per_chain, residual, target_of, volume
 
 FAMILIES = (
     Family("spherical hip", ("No spherical hip", "no spherical wrist"), spherical_hip.recognise),
@@ -154,7 +154,7 @@ def _with_free_tip(chain: SerialChain, family: str | None) -> ClosedForm:
     return ClosedForm(chain, f"{form.family}, tip free", False, False, formulas)
 
 
-@cached
+@per_chain
 def recognised(chain: SerialChain, position: bool = False) -> ClosedForm | None:
     """The closed form of a limb, None where it has none."""
     try:

@@ -21,7 +21,7 @@ from screwkin.compiler.run import run
 from screwkin.ik.elimination import ANGLES, BRANCHES, Elimination, dialytic, eliminations, vanishing
 from screwkin.ik.polish import polished
 from screwkin.ik.starts import box, spread
-from screwkin.kinematics.serial_chain import SerialChain, cached, forward
+from screwkin.kinematics.serial_chain import SerialChain, forward, per_chain
 
 BLOCK = 512
 """Samples computed together, which bounds the memory of a large batch."""
@@ -41,7 +41,7 @@ ROUNDING = 1e-15
 """Rounding of the determinant over its largest value."""
 
 
-@cached
+@per_chain
 def elimination(chain: SerialChain) -> Elimination | None:
     """The most exact way to eliminate for a limb, None where there is none.
 
@@ -54,13 +54,13 @@ def elimination(chain: SerialChain) -> Elimination | None:
     return best if error <= ROUGHLY else None
 
 
-@cached
+@per_chain
 def exact(chain: SerialChain) -> bool:
     """Whether no branches are missed but those that nearly fall together."""
     return _most_exact(chain)[1] <= EXACT_ENOUGH
 
 
-@cached
+@per_chain
 def _most_exact(chain: SerialChain) -> tuple[Elimination | None, float]:
     """The way with least errors of the given joint, and how large these are at nine of ten poses [rad].
 
@@ -184,7 +184,7 @@ def zero(order: int) -> Program:
     return recorder.program()
 
 
-@cached
+@per_chain
 def equations(chain: SerialChain) -> Program:
     """The table of ``Elimination`` for a pose of the tip."""
     way = elimination(chain)
@@ -206,7 +206,7 @@ def values() -> Program:
     return recorder.program()
 
 
-@cached
+@per_chain
 def branch(chain: SerialChain) -> Program:
     """The positions of a limb for one zero of the determinant."""
     way = elimination(chain)

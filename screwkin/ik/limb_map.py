@@ -22,7 +22,7 @@ from screwkin.ik.closed import closed_form
 from screwkin.ik.programs import cosines, wrapped_angles
 from screwkin.kinematics.limits import beyond
 from screwkin.kinematics.serial_chain import SerialChain
-from screwkin.mechanism.limb_motion import seen_from
+from screwkin.mechanism.limb_motion import displacements_seen_from
 from screwkin.model.robot import Robot
 
 CLEAR = 1e-7
@@ -154,7 +154,7 @@ def _conditioning(
     chain: SerialChain, q: Sequence[Scalar], target: Pose, length: float, link: int
 ) -> tuple[Extremes, Scalar]:
     """Singular values of the tip's Jacobian in the axes of a link, and the residual of the tip's pose."""
-    seen = seen_from(chain.screws, q, link)
+    seen = displacements_seen_from(chain.screws, q, link)
     tip, wanted = seen[-1] @ chain.tip.p, seen[0] @ target.p
     columns = []
     for place, screw in zip(seen, chain.screws, strict=False):

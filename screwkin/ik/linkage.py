@@ -49,7 +49,9 @@ class Completed:
         return np.asarray(self.gap <= CLOSED)
 
 
-def completed(robot: Robot, linkage: Linkage, q: Array, leading: Sequence[int] | None = None) -> Completed:
+def with_followers(
+    robot: Robot, linkage: Linkage, q: Array, leading: Sequence[int] | None = None
+) -> Completed:
     """Positions of the joints that follow in a linkage.
 
     Args:

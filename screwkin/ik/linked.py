@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.ik.linkage import completed
+from screwkin.ik.linkage import with_followers
 from screwkin.ik.solutions import LimbSolutions, ordered
 from screwkin.kinematics import limits
 from screwkin.kinematics.serial_chain import SerialChain
@@ -64,7 +64,7 @@ def completed_limb(robot: Robot, chain: SerialChain, q: Array) -> tuple[Array, A
     whole[:, [i for _, i in own]] = q[:, [k for k, _ in own]]
     gap = np.zeros(len(q))
     for linkage in parts:
-        done = completed(robot, linkage, whole)
+        done = with_followers(robot, linkage, whole)
         whole, gap = done.q, np.hypot(gap, np.where(done.closed, 0.0, done.gap))
     return np.concatenate([q, whole[:, list(beside(robot, chain.limb))]], axis=1), gap
 
@@ -139,5 +139,5 @@ def carried_by_motors(robot: Robot, motors: Sequence[str], q: Array, others: Arr
     whole = others.copy()
     whole[:, [robot.joint_names.index(name) for name in motors]] = q
     for linkage in linkages(robot):
-        whole = completed(robot, linkage, whole, linkage.motors).q
+        whole = with_followers(robot, linkage, whole, linkage.motors).q
     return whole

@@ -17,7 +17,7 @@ from screwkin.algebra.screws import Screw, displacement
 from screwkin.algebra.se3 import Pose, Vector, cross, dot, map_scalars, norm, rotate
 from screwkin.ik.family import Formulas
 from screwkin.ik.hip_equations import HipEquations, chosen, pitch_directions
-from screwkin.ik.planar_triangle import across, planar_branches
+from screwkin.ik.planar_triangle import part_across, planar_branches
 from screwkin.ik.subproblems import turn_onto
 from screwkin.kinematics.axis_geometry import ALIKE, angle, apart, joint_list, parallel
 from screwkin.kinematics.serial_chain import SerialChain
@@ -112,8 +112,8 @@ def _within_reach(screws: Sequence[Screw], D: Pose, length: float) -> Array:
     q1, q6 = _both_directions(HipEquations.of(screws, D), screws, D, fan)
     E = _planar_part(screws, D, q1, q6)[1]
     hip, knee, ankle = screws[2:5]
-    sides = [norm(across(hip.s, b.s0 - a.s0)) for a, b in ((hip, knee), (knee, ankle))]
-    reach = norm(across(hip.s, E @ ankle.s0 - hip.s0))
+    sides = [norm(part_across(hip.s, b.s0 - a.s0)) for a, b in ((hip, knee), (knee, ankle))]
+    reach = norm(part_across(hip.s, E @ ankle.s0 - hip.s0))
     beyond = np.maximum(reach - sides[0] - sides[1], abs(sides[0] - sides[1]) - reach)
     best = np.argsort(beyond, axis=0, kind="stable")[:4]
     return np.take_along_axis(q1, best, axis=0)

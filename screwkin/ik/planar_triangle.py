@@ -10,7 +10,7 @@ from screwkin.algebra.se3 import Pose, Vector, dot, rotate
 from screwkin.ik.subproblems import level_turns, turn_onto
 
 
-def across(normal: Vector, a: Vector) -> Vector:
+def part_across(normal: Vector, a: Vector) -> Vector:
     """The part of a in the plane with that unit normal."""
     return a - normal * dot(normal, a)
 
@@ -26,9 +26,9 @@ def planar_branches(screws: Sequence[Screw], E: Pose) -> list[tuple[Scalar, Scal
             stretched (or folded) towards it.
     """
     hip, knee, ankle = screws
-    upper = across(hip.s, knee.s0 - hip.s0)
-    lower = across(hip.s, ankle.s0 - knee.s0)
-    wanted = across(hip.s, E @ ankle.s0 - hip.s0)
+    upper = part_across(hip.s, knee.s0 - hip.s0)
+    lower = part_across(hip.s, ankle.s0 - knee.s0)
+    wanted = part_across(hip.s, E @ ankle.s0 - hip.s0)
     # |upper + R4 lower| = |wanted|
     level = times(minus(minus(dot(wanted, wanted), dot(upper, upper)), dot(lower, lower)), 0.5)
     branches = []

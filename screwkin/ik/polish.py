@@ -13,7 +13,7 @@ from screwkin.algebra.se3 import Pose, Twist, cross
 from screwkin.compiler.program import Program, Recorder
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.compiler.run import run
-from screwkin.kinematics.serial_chain import SerialChain, cached, forward, miss
+from screwkin.kinematics.serial_chain import SerialChain, forward, miss, per_chain
 from screwkin.mechanism.limb_rates import pose_rates
 
 NEWTON = 2
@@ -49,7 +49,7 @@ def _newton_step(chain: SerialChain, q: Sequence[Scalar], target: Pose) -> list[
     return [x + larger(-LONGEST, least(rate, LONGEST)) for x, rate in zip(q, rates, strict=True)]
 
 
-@cached
+@per_chain
 def steps(chain: SerialChain) -> Program:
     """Some Newton steps of a limb."""
     recorder = Recorder(

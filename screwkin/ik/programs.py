@@ -21,7 +21,7 @@ from screwkin.kinematics.arrays import Argument
 from screwkin.kinematics.door import Door
 from screwkin.kinematics.limits import CUT, TURN, beyond, turn_within
 from screwkin.kinematics.rigid import nearest_pose
-from screwkin.kinematics.serial_chain import SerialChain, cached, miss
+from screwkin.kinematics.serial_chain import SerialChain, miss, per_chain
 from screwkin.kinematics.status import SINGULAR
 from screwkin.mechanism.limb_motion import seen_screws
 from screwkin.mechanism.limb_rates import point_rates, pose_rates, split_of
@@ -69,7 +69,7 @@ def wrapped_angles(chain: SerialChain, q: Sequence[Scalar]) -> list[Scalar]:
     return angles
 
 
-@cached
+@per_chain
 def limb_branches(chain: SerialChain, position: bool) -> Door:
     """All solutions of a limb's closed form, in the order of ``ik.solutions.ordered``."""
     form = recognised(chain, position)
@@ -155,7 +155,7 @@ def _in_order(a: list[Scalar], b: list[Scalar]) -> tuple[list[Scalar], list[Scal
     return first, [where(swap, x, y) for x, y in zip(a, b, strict=True)]
 
 
-@cached
+@per_chain
 def limb_pose(chain: SerialChain, position: bool) -> Door:
     """The one solution of a limb that ``solve_pose`` takes, for a target in the world."""
     recorder = Recorder(

@@ -12,7 +12,7 @@ from screwkin.algebra.screws import Screw
 from screwkin.algebra.se3 import dot, norm
 from screwkin.ik.closed import ClosedForm, recognised
 from screwkin.kinematics.axis_geometry import meeting, parallel
-from screwkin.kinematics.serial_chain import SerialChain, cached
+from screwkin.kinematics.serial_chain import SerialChain, per_chain
 
 NEARLY = 1e-4
 """Largest angle [rad] and, over the limb's size, distance at which axes count as parallel or meeting.
@@ -23,7 +23,7 @@ GROUPS = ((0, 1, 2), (3, 4, 5), (0, 1), (4, 5))
 """Neighbouring axes that closed forms want to meet."""
 
 
-@cached
+@per_chain
 def relative(chain: SerialChain) -> ClosedForm | None:
     """The closed form of the nearest limb that has one, None where there is none within ``NEARLY``."""
     if len(chain.screws) != 6 or not chain.turning.all():

@@ -153,7 +153,7 @@ class SerialChain:
         return limits.nearest_turn(q, guess, self.lower, self.upper, self.turning)
 
 
-def cached(function: Callable[Concatenate[SerialChain, P], T]) -> Callable[Concatenate[SerialChain, P], T]:
+def per_chain(function: Callable[Concatenate[SerialChain, P], T]) -> Callable[Concatenate[SerialChain, P], T]:
     """A function of a chain and of hashable arguments, computed once for as long as the chain is there."""
 
     @wraps(function)

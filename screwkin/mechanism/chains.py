@@ -15,7 +15,14 @@ from collections.abc import Sequence
 from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.se3 import IDENTITY, UNTURNED, Pose, Rotation, Twist, Vector
 from screwkin.errors import InputError
-from screwkin.mechanism.pairs import NAMED, completed, pair_coordinates, pair_pose, pair_screws, turns
+from screwkin.mechanism.pairs import (
+    NAMED,
+    pair_coordinates,
+    pair_pose,
+    pair_screws,
+    successive_turns,
+    three_axes,
+)
 
 SPATIAL, PLANAR, SPHERICAL = (NAMED[name] for name in ("3P3R", "PPR", "3R"))
 
@@ -42,7 +49,7 @@ def check_chain(chain: Sequence[str]) -> tuple[str, ...]:
 
 def rotations(chain: Sequence[str]) -> list[str]:
     """The axes of the chain's rotations, completed to three: x, y, z in the order in which they turn."""
-    return completed([c[1] for c in chain if c[0] == "r"])
+    return three_axes([c[1] for c in chain if c[0] == "r"])
 
 
 def held_pose(chain: Sequence[str], home: Pose) -> Pose:
@@ -77,7 +84,7 @@ def chain_twists(chain: Sequence[str], R: Rotation, p: Vector) -> list[Twist]:
 
     World axes; p and the twists are taken from the same point.
     """
-    return chain_screws(chain, turns([c[1] for c in chain if c[0] == "r"], R), p)
+    return chain_screws(chain, successive_turns([c[1] for c in chain if c[0] == "r"], R), p)
 
 
 def chain_screws(chain: Sequence[str], angles: Sequence[Scalar], p: Vector) -> list[Twist]:

@@ -60,7 +60,9 @@ def free_screws(mechanism: Mechanism, block: int, N: Array, S: Array, null: floa
     local = _at(N[block_rows(circuits)], middle, size)
     rates = np.zeros(len(mechanism.couplings))
     rates[columns] = np.linalg.svd(local[:, columns])[2][-1]
-    body, twist = _moving_body(mechanism, link_twists(mechanism, S, mechanism.gears @ rates), middle, size)
+    body, twist = _moving_body(
+        mechanism, free_link_twists(mechanism, S, mechanism.gears @ rates), middle, size
+    )
     motion = twist_screw(twist, middle, size)
     wrench = _free_wrench(local, columns, mechanism.primary_columns, null, middle, size)
     if wrench is None:
@@ -68,7 +70,7 @@ def free_screws(mechanism: Mechanism, block: int, N: Array, S: Array, null: floa
     return FreeScrews(body, motion, wrench_screw(wrench, middle, size))
 
 
-def link_twists(mechanism: Mechanism, S: Array, rates: Array) -> dict[str, Array]:
+def free_link_twists(mechanism: Mechanism, S: Array, rates: Array) -> dict[str, Array]:
     """Twist (6,) of every link, virtual ones included, when all edges move at some rates."""
     twists, edges = {FLOOR: np.zeros(6)}, list(enumerate(mechanism.graph.edges))
     if FLOOR not in mechanism.links:

@@ -120,14 +120,14 @@ def seen_screws(
     chain: SerialChain, split: Split | None, q: Sequence[Scalar], joints: int
 ) -> tuple[Twist, ...]:
     """A limb's screws at ``point_of``, axes of the link after that many joints."""
-    seen = seen_from(chain.screws, q, joints)
+    seen = displacements_seen_from(chain.screws, q, joints)
     link, fixed = reference_point(chain, split)
     here = seen[link] @ fixed
     screws = [carry(d, screw) for d, screw in zip(seen, chain.screws, strict=False)]
     return tuple(Screw(s.s, s.s0 - here, s.pitch).twist for s in screws)
 
 
-def seen_from(screws: Sequence[Screw], q: Sequence[Scalar], joints: int) -> list[Displacement]:
+def displacements_seen_from(screws: Sequence[Screw], q: Sequence[Scalar], joints: int) -> list[Displacement]:
     """Displacements of a chain's links, base first, relative to the link after that many joints.
 
     The zero pose is the frame of reference: the link itself is at rest.

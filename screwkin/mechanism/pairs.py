@@ -117,8 +117,8 @@ def pair_coordinates(pairs: Sequence[str], pose: Pose) -> list[Scalar]:
     if not _turns_known(pairs):
         arm, wrist = _parted(pairs)
         values = _arm_coordinates(arm, pose.p)
-        return values + turns([c[1] for c in wrist], pair_pose(arm, values).R.T @ pose.R)
-    angles = iter(turns([c[1] for c in pairs if c[0] == "r"], pose.R))
+        return values + successive_turns([c[1] for c in wrist], pair_pose(arm, values).R.T @ pose.R)
+    angles = iter(successive_turns([c[1] for c in pairs if c[0] == "r"], pose.R))
     R, directions, values = UNTURNED, [], []
     for pair in pairs:
         axis = AXES[pair[1]]
@@ -190,14 +190,14 @@ def shares(directions: Sequence[Vector], wanted: Vector) -> list[Scalar]:
     return cramer(completed, wanted)[0][: len(directions)]
 
 
-def completed(axes: Sequence[str]) -> list[str]:
+def three_axes(axes: Sequence[str]) -> list[str]:
     """Axes of up to three rotations, completed to three."""
     return [*axes, *(a for a in "xyz" if a not in axes)][:3]
 
 
-def turns(axes: Sequence[str], R: Rotation) -> list[Scalar]:
+def successive_turns(axes: Sequence[str], R: Rotation) -> list[Scalar]:
     """Angles [rad] of up to three successive rotations, no axis twice in a row, that make an orientation."""
-    a, b, c = completed(axes)
+    a, b, c = three_axes(axes)
     i, j, k = _INDEX[a], _INDEX[b], _INDEX[c]
     columns = (tuple(R.x), tuple(R.y), tuple(R.z))
 

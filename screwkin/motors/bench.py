@@ -67,7 +67,7 @@ def load_bench_log(path: str | Path) -> BenchLog:
     return BenchLog(path.name, str(data.get("motor", "")), time, goal, position, gain, voltage, hanging)
 
 
-def replayed(motor: Motor, log: BenchLog, offset: float = 0.0, dt: float = STEP) -> Array:
+def replayed_angles(motor: Motor, log: BenchLog, offset: float = 0.0, dt: float = STEP) -> Array:
     """Angles (T,) [rad] at the times of a log, simulated from its goals and its first position alone."""
     grid = np.arange(0.0, log.time[-1] + dt, dt)
     goals = delayed(np.interp(grid, log.time, log.goal), motor.lag, dt)
@@ -78,7 +78,7 @@ def replayed(motor: Motor, log: BenchLog, offset: float = 0.0, dt: float = STEP)
 
 def position_error(motor: Motor, log: BenchLog, offset: float = 0.0) -> float:
     """Mean absolute error [rad] of ``replayed`` against the log."""
-    return float(np.abs(replayed(motor, log, offset) - log.position).mean())
+    return float(np.abs(replayed_angles(motor, log, offset) - log.position).mean())
 
 
 def as_logged(motor: Motor, log: BenchLog) -> Motor:

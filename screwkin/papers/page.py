@@ -17,7 +17,7 @@ from screwkin.papers.bench import Bench
 from screwkin.papers.claims import Paper, Picture
 from screwkin.papers.drawings import DRAWINGS
 from screwkin.papers.measures import check_call
-from screwkin.papers.reproduce import Measured, Reproduction
+from screwkin.papers.reproduce import MeasuredSection, Reproduction
 from screwkin.report.page import figure_html
 from screwkin.report.style import DPI, styled
 
@@ -156,7 +156,7 @@ def _html(result: Reproduction, pictures: Sequence[Sequence[Drawn]], command: st
     return _PAGE.format(title=escape(paper.title), style=_style(), body="\n".join(body))
 
 
-def _table(measured: Measured) -> str:
+def _table(measured: MeasuredSection) -> str:
     head = "".join(f"<th>{name}</th>" for name in _HEAD)
     rows = [
         f'<tr><td>{_text(item)}</td><td class="number">{_text(paper)}</td>'

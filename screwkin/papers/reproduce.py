@@ -68,7 +68,7 @@ class ClaimResult:
 
 
 @dataclass(frozen=True)
-class Measured:
+class MeasuredSection:
     """A section of a paper with its rows measured."""
 
     section: Section
@@ -99,7 +99,7 @@ class Reproduction:
     """A paper with all its rows measured."""
 
     paper: Paper
-    sections: tuple[Measured, ...]
+    sections: tuple[MeasuredSection, ...]
 
     @property
     def lines(self) -> tuple[ClaimResult, ...]:
@@ -161,7 +161,7 @@ def reproduce(paper: Paper, bench: Bench, progress: Progress = lambda share: Non
             lines.append(_measured(section, row, bench))
             done += 1
             progress(done / total)
-        sections.append(Measured(section, tuple(lines)))
+        sections.append(MeasuredSection(section, tuple(lines)))
     return Reproduction(paper, tuple(sections))
 
 

@@ -12,7 +12,7 @@ from screwkin.servo.bus import Bus, Grouped
 from screwkin.servo.gate import Bounds
 from screwkin.servo.line import BusError, LineLostError, Reply
 from screwkin.servo.profiles import Profile, decode, physical
-from screwkin.servo.roundtrip import latency_advice, measured
+from screwkin.servo.roundtrip import latency_advice, measured_round_trips
 
 Taken = Callable[[int, Reply], None]
 """Called with joint and answer."""
@@ -69,7 +69,7 @@ class Readings:
         """
         start, length, _ = self.blocks[0]
         try:
-            trip = measured(self.bus, self.bounds.ids, start, length)
+            trip = measured_round_trips(self.bus, self.bounds.ids, start, length)
         except LineLostError:
             raise
         except BusError as error:

@@ -63,7 +63,9 @@ def round_trip(bus: Bus) -> RoundTrip | None:
     return RoundTrip(float(least), float(median), float(most), len(times))
 
 
-def measured(bus: Bus, ids: Sequence[int], address: int, length: int, count: int = SAMPLES) -> RoundTrip:
+def measured_round_trips(
+    bus: Bus, ids: Sequence[int], address: int, length: int, count: int = SAMPLES
+) -> RoundTrip:
     """The round trips of a bus, of the recent answers and as many more as it takes.
 
     Args:

@@ -23,7 +23,7 @@ LEAST = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class SimBody:
     """A link with the joints between it and its parent, the parent's side first.
 
     frame: (4, 4) of the link in the zero pose, in base axes; the base link's is the base frame.
@@ -61,7 +61,7 @@ class Body:
         return R.T @ np.array([[i.xx, i.xy, i.xz], [i.xy, i.yy, i.yz], [i.xz, i.yz, i.zz]], dtype=float) @ R
 
 
-def bodies_of(robot: Robot) -> tuple[tuple[Body, ...], tuple[str, ...]]:
+def bodies_of(robot: Robot) -> tuple[tuple[SimBody, ...], tuple[str, ...]]:
     """The bodies of a robot, parents first, and a remark on every link that is not the table's.
 
     Args:
@@ -78,7 +78,7 @@ def bodies_of(robot: Robot) -> tuple[tuple[Body, ...], tuple[str, ...]]:
     }
     floored = {link.name: link for link in robot.with_inertia_floor().links if link.name in light}
     frames = {name: as_array(robot.frame(name)[1]) for name in robot.link_names}
-    bodies = [Body(floored.get(robot.base_link, robot.link(robot.base_link)), None, (), np.eye(4))]
+    bodies = [SimBody(floored.get(robot.base_link, robot.link(robot.base_link)), None, (), np.eye(4))]
     above: dict[str, tuple[str, tuple[Joint, ...]]] = {}
     for joint in (robot.tree[i] for i in robot.traversal):
         parent, joints = above.get(joint.parent, (joint.parent, ()))
@@ -86,7 +86,7 @@ def bodies_of(robot: Robot) -> tuple[tuple[Body, ...], tuple[str, ...]]:
             above[joint.child] = (parent, (*joints, joint))
             continue
         link = floored.get(joint.child, robot.link(joint.child))
-        bodies.append(Body(link, parent, (*joints, joint), frames[joint.child]))
+        bodies.append(SimBody(link, parent, (*joints, joint), frames[joint.child]))
     return tuple(bodies), _remarks(sorted(merged), [body.link for body in bodies if body.link.name in light])
 
 

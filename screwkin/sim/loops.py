@@ -11,7 +11,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import Pose, as_array, pose_from_array
 from screwkin.model.robot import Robot
 from screwkin.model.urdf import urdf_frames
-from screwkin.sim.bodies import Body
+from screwkin.sim.bodies import SimBody
 from screwkin.sim.couplings import STIFF
 from screwkin.sim.drive import UNLIMITED
 
@@ -19,7 +19,7 @@ ERP = 0.2
 """Share of a gap that PyBullet removes in one step."""
 
 
-def close_in_mujoco(mj: Any, spec: Any, robot: Robot, bodies: Mapping[str, tuple[Any, Body]]) -> None:
+def close_in_mujoco(mj: Any, spec: Any, robot: Robot, bodies: Mapping[str, tuple[Any, SimBody]]) -> None:
     """A weld of two sites for every closure.
 
     Args:

@@ -26,7 +26,7 @@ from screwkin.model.inertias import impossible
 from screwkin.model.robot import Joint, Robot
 from screwkin.model.state import State
 from screwkin.sim.backend import Command, Contact, Observation, moment_about_origin
-from screwkin.sim.bodies import Body, bodies_of
+from screwkin.sim.bodies import SimBody, bodies_of
 from screwkin.sim.couplings import STIFF, couple_in_mujoco
 from screwkin.sim.drive import UNLIMITED, RigidServos, Servos, motored
 from screwkin.sim.loops import close_in_mujoco
@@ -254,7 +254,7 @@ def _world(mj: Any, physics: MuJoCoPhysics) -> Any:
     return spec
 
 
-def _add_bodies(mj: Any, spec: Any, robot: Robot, bodies: tuple[Body, ...], rotors: Array) -> None:
+def _add_bodies(mj: Any, spec: Any, robot: Robot, bodies: tuple[SimBody, ...], rotors: Array) -> None:
     """All links with their joints, inertias and boxes."""
     rotor = dict(zip(robot.joint_names, rotors.tolist(), strict=True))
     made: dict[str | None, tuple[Any, Array]] = {None: (spec.worldbody, np.eye(4))}
@@ -287,7 +287,7 @@ def _add_bodies(mj: Any, spec: Any, robot: Robot, bodies: tuple[Body, ...], roto
 _ROBOT_GEOM = {"contype": 0, "conaffinity": 1, "friction": [0.0, 0.0, 0.0], "mass": 0.0}
 
 
-def _add_joint(mj: Any, element: Any, body: Body, joint: Joint, rotor: float) -> None:
+def _add_joint(mj: Any, element: Any, body: SimBody, joint: Joint, rotor: float) -> None:
     kinds = {"revolute": mj.mjtJoint.mjJNT_HINGE, "prismatic": mj.mjtJoint.mjJNT_SLIDE}
     limits = np.clip([joint.lower, joint.upper], -UNLIMITED, UNLIMITED)
     element.add_joint(
@@ -302,7 +302,7 @@ def _add_joint(mj: Any, element: Any, body: Body, joint: Joint, rotor: float) ->
     )
 
 
-def _bare_corners(robot: Robot, body: Body) -> list[Array]:
+def _bare_corners(robot: Robot, body: SimBody) -> list[Array]:
     """Centres of spheres for the corners of a link's sole that are no corners of one of its boxes."""
     limbs = [limb.name for limb in robot.limbs if limb.link == body.link.name]
     soles = [sole for sole in robot.soles if sole.limb in limbs]

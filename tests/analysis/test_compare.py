@@ -13,7 +13,7 @@ import pytest
 from screwkin.algebra.screws import Screw
 from screwkin.algebra.se3 import UNTURNED, Pose, Vector, as_array
 from screwkin.analysis.chains import by_dh, by_library, by_screws, chains_of, reversed_table, support_models
-from screwkin.analysis.compare import compare_models, differences, random_positions
+from screwkin.analysis.compare import compare_models, largest_differences, random_positions
 from screwkin.analysis.misalignment import misalignment, sensitivity
 from screwkin.analysis.operations import _count, operations
 from screwkin.errors import InputError
@@ -87,7 +87,7 @@ def test_a_wrong_number_in_a_printed_table_is_seen(tmp_path):
     robot = with_table(tmp_path, ("left_knee,revolute,0,181", "left_knee,revolute,0,182"))
     chains = chains_of(robot)
     q = random_positions(robot, 100, np.random.default_rng(4))
-    fk, jacobian = differences(chains, support_models(robot, chains), q)
+    fk, jacobian = largest_differences(chains, support_models(robot, chains), q)
     assert fk > 5e-4
     assert jacobian > 5e-4
 

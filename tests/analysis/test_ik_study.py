@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from screwkin.analysis import ik_others
-from screwkin.analysis.ik_study import IkRow, fitting_entries, ik_study, measured
+from screwkin.analysis.ik_study import IkRow, fitting_entries, ik_study, measured_row
 from screwkin.analysis.ik_targets import (
     FootPath,
     foot_from_waist,
@@ -38,7 +38,7 @@ def rows(leg: SerialChain) -> dict[str, IkRow]:
     target = walking_targets(leg, walking_path(leg))
     wanted = ("closed", "hybrid-newton", "hybrid-lm", "hybrid-dls", "dls-0.01", "dls-0.055", "pinv")
     entries = [entry for entry in fitting_entries(leg, 500) if entry.name in wanted]
-    return {entry.name: measured(leg, "gait", target, entry) for entry in entries}
+    return {entry.name: measured_row(leg, "gait", target, entry) for entry in entries}
 
 
 def test_hybrids_take_at_most_three_iterations_on_all_points_of_the_walk(rows: dict[str, IkRow]) -> None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from screwkin.motors.bench import load_bench_log, replayed
+from screwkin.motors.bench import load_bench_log, replayed_angles
 from screwkin.motors.library import load_motor
 
 
@@ -25,7 +25,7 @@ def logs(tmp_path):
         ]
         data = {"mass": mass, "length": 0.1, "kp": gain, "vin": 7.4, "motor": "xl330", "entries": rows}
         path.write_text(json.dumps(data), encoding="utf-8")
-        for row, angle in zip(rows, replayed(servo, load_bench_log(path)).tolist(), strict=True):
+        for row, angle in zip(rows, replayed_angles(servo, load_bench_log(path)).tolist(), strict=True):
             row["position"] = angle
         path.write_text(json.dumps(data), encoding="utf-8")
         paths.append(path)

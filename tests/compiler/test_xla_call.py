@@ -36,7 +36,7 @@ def calls(f, *inputs):
 @pytest.mark.parametrize("count", [1, 15, 16, 17, 5000])
 def test_batches_of_any_size_give_the_numbers_of_numpy(program, count):
     T, q = inputs_of(count)
-    f = xla_call.function(program)
+    f = xla_call.xla_function(program)
     assert calls(f, T, q)
     (found,) = jax.jit(f)(T, q)
     told = {"T_world_base": np.asarray(T), "q": np.asarray(q)}
@@ -46,7 +46,7 @@ def test_batches_of_any_size_give_the_numbers_of_numpy(program, count):
 @compiled
 def test_batches_have_any_shape_and_broadcast(program):
     T, q = inputs_of(6)
-    f = xla_call.function(program)
+    f = xla_call.xla_function(program)
     flat = f(T[:1], q)[0]
     assert f(T[0], q[0])[0].shape == (3,)
     np.testing.assert_allclose(f(T[0], q.reshape(2, 3, 12))[0].reshape(6, 3), flat, atol=0)
@@ -57,7 +57,7 @@ def test_robots_of_one_text_share_their_handler():
     text, found = sk.load_robot("poppy12").text, []
     for _ in range(2):
         robot = sk.robot_from_text(text, name="twin")
-        f = xla_call.function(body.center_of_mass.program(robot))
+        f = xla_call.xla_function(body.center_of_mass.program(robot))
         found.append(np.asarray(jax.jit(f)(*inputs_of(3))[0]))
     np.testing.assert_array_equal(*found)
 
@@ -65,7 +65,7 @@ def test_robots_of_one_text_share_their_handler():
 @compiled
 def test_vmap_adds_its_axis_to_the_batch(program):
     T, q = inputs_of(5)
-    f = xla_call.function(program)
+    f = xla_call.xla_function(program)
     (alone,) = f(T[0], q)
     (mapped,) = jax.jit(jax.vmap(f, in_axes=(None, 1), out_axes=1))(T[0], q.T)
     np.testing.assert_allclose(mapped.T, alone, atol=0)
@@ -79,7 +79,7 @@ def test_gradients_of_batches_and_batches_of_gradients():
     shin = robot.joints[robot.path_to(robot.limb("left_leg").link)[4]].child
     program = body.frame_pose.program(robot, shin)
     T, q = inputs_of(4)
-    f, plain = xla_call.function(program), emit_jax.function(program)
+    f, plain = xla_call.xla_function(program), emit_jax.function(program)
 
     def height(T, q):
         return f(T, q)[0][..., 2, 3].sum()
@@ -99,7 +99,7 @@ def test_gradients_of_batches_and_batches_of_gradients():
 @compiled
 def test_other_types_are_computed_by_xla(program):
     T, q = inputs_of(4)
-    f = xla_call.function(program)
+    f = xla_call.xla_function(program)
     single = (T.astype(np.float32), q.astype(np.float32))
     assert not calls(f, *single)
     np.testing.assert_allclose(f(*single)[0], f(T, q)[0], atol=1e-5)
@@ -108,7 +108,7 @@ def test_other_types_are_computed_by_xla(program):
 def test_without_a_compiler_xla_computes(program, monkeypatch):
     monkeypatch.setattr(native, "compiler", lambda: None)
     T, q = inputs_of(4)
-    f = xla_call.function.__wrapped__(program)
+    f = xla_call.xla_function.__wrapped__(program)
     assert not calls(f, T, q)
     last = emit_jax.function(program)(jnp.moveaxis(T, 0, -1), q.T)[0]
     np.testing.assert_allclose(f(T, q)[0], last.T, atol=0)

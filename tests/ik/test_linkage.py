@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import screwkin as sk
 from screwkin.errors import InputError
-from screwkin.ik.linkage import completed, needs_newton
+from screwkin.ik.linkage import needs_newton, with_followers
 from screwkin.mechanism.linkages import Linkage, limb_linkages, linkages, motor_joints
 from screwkin.model.robot import Robot
 from screwkin.model.table import parse_robot
@@ -38,7 +38,7 @@ def test_a_knee_by_any_four_bar_closes_or_is_known_not_to(
     linkage = limb_linkages(robot, "right_leg")[0]
     assert not needs_newton(robot, linkage)
     knee = np.linspace(0, most, 40)
-    done = completed(robot, linkage, moved(robot, linkage, knee))
+    done = with_followers(robot, linkage, moved(robot, linkage, knee))
     np.testing.assert_allclose(gaps(robot, done.q)[done.closed, 0], 0, atol=1e-12)
     # The rod reaches exactly as far as the triangle of crank, rod and the lever's pin.
     thigh, rod = (
@@ -61,13 +61,13 @@ def test_linkages_follow_without_a_jump_and_alone_as_in_a_batch(name: str, data:
     ends = [data.draw(st.floats(-0.5, 0.5)) for _ in linkage.imposed]
     ways = [h + np.linspace(0, e, 60) for h, e in zip(home, ends, strict=True)]
     q = moved(robot, linkage, *ways)
-    done = completed(robot, linkage, q)
+    done = with_followers(robot, linkage, q)
     assert done.closed.all()
     row = robot.closures.index(linkage.closures[0])
     np.testing.assert_allclose(gaps(robot, done.q)[:, row], 0, atol=1e-10)
     assert np.abs(np.diff(done.q, axis=0)).max() < 0.1
     k = data.draw(st.integers(0, 59))
-    alone = completed(robot, linkage, q[k : k + 1])
+    alone = with_followers(robot, linkage, q[k : k + 1])
     np.testing.assert_allclose(alone.q[0], done.q[k], atol=1e-12)
 
 
@@ -75,7 +75,7 @@ def test_the_motor_of_a_parallelogram_turns_with_the_knee() -> None:
     robot = flat_at_90()
     linkage = limb_linkages(robot, "left_leg")[0]
     knee = np.linspace(-1.5, 1.5, 101)
-    q = completed(robot, linkage, moved(robot, linkage, knee)).q
+    q = with_followers(robot, linkage, moved(robot, linkage, knee)).q
     np.testing.assert_allclose(q[:, robot.joint_names.index("left_knee_motor")], knee, atol=1e-7)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from screwkin.errors import InputError, UnknownNameError
-from screwkin.motors.bench import BenchLog, load_bench_log, position_error, replayed
+from screwkin.motors.bench import BenchLog, load_bench_log, position_error, replayed_angles
 from screwkin.motors.identify import identify
 from screwkin.motors.library import load_motor
 from screwkin.motors.pendulum import Pendulum
@@ -31,7 +31,7 @@ def bench_log(name: str, gain: float, mass: float, seconds: float = 2.0) -> Benc
     time = np.arange(0.0, seconds, 0.01)
     goal = 0.9 * np.sin(4.0 * time) + 0.4 * np.sin(11.0 * time)
     log = BenchLog(name, "XL330", time, goal, 0.0 * goal, gain, 7.4, Pendulum.of_mass(mass, 0.1))
-    return replace(log, position=replayed(TRUE, log))
+    return replace(log, position=replayed_angles(TRUE, log))
 
 
 def test_a_log_made_from_known_figures_is_replayed_by_them_and_by_no_others():

@@ -209,7 +209,7 @@ def test_what_is_measured_stands_for_what_the_adapter_does():
     for adapter in (0.0, 0.001, 0.016, 0.04):
         rig = Rig(adapter)
         start, length, _ = rig.player.readings.blocks[0]
-        trip = roundtrip.measured(rig.player.bus, rig.player.bounds.ids, start, length, 100)
+        trip = roundtrip.measured_round_trips(rig.player.bus, rig.player.bounds.ids, start, length, 100)
         wire = 1e-5 * (8 + 6 + length) + 500e-6
         assert trip.count == 100
         for time in (trip.least, trip.median, trip.most):

@@ -15,7 +15,7 @@ from screwkin.servo.packets import Packet
 from screwkin.servo.profiles import load_profile, radians_from_ticks
 from screwkin.servo.protocols import codec
 from screwkin.servo.servo_map import ServoMap
-from screwkin.servo.virtual.body import follow
+from screwkin.servo.virtual.body import approached
 from screwkin.servo.virtual.bus import SimulatedClock, VirtualBus
 from screwkin.servo.virtual.faults import KINDS, InjectedFault
 from screwkin.servo.virtual.robot import virtual_servos
@@ -55,7 +55,7 @@ class Line:
 
 @given(st.floats(-2, 2), st.floats(-2, 2), st.floats(0.1, 10), st.floats(0.001, 0.2), st.floats(0, 2))
 def test_motion_is_the_solution_of_its_equation(angle, goal, speed, lag, time):
-    found, rate = follow(angle, goal, time, speed, lag)
+    found, rate = approached(angle, goal, time, speed, lag)
     steps = 4000
     exact = angle
     for _ in range(steps):
@@ -68,8 +68,8 @@ def test_motion_is_the_solution_of_its_equation(angle, goal, speed, lag, time):
 def test_motion_does_not_depend_on_how_often_one_looks(steps):
     angle = 0.0
     for dt in steps:
-        angle, _ = follow(angle, 1.0, dt, 6.0, 0.025)
-    assert angle == pytest.approx(follow(0.0, 1.0, sum(steps), 6.0, 0.025)[0], abs=1e-12)
+        angle, _ = approached(angle, 1.0, dt, 6.0, 0.025)
+    assert angle == pytest.approx(approached(0.0, 1.0, sum(steps), 6.0, 0.025)[0], abs=1e-12)
 
 
 def test_the_speed_register_limits_the_speed():

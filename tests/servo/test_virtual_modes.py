@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from screwkin.servo.modes import servo_mode
 from screwkin.servo.profiles import load_profile, profile_models
-from screwkin.servo.virtual.body import follow, spin
+from screwkin.servo.virtual.body import approached, spin
 from screwkin.servo.virtual.frame import frame_of
 from tests.servo.benches import Bench, X, refusal
 
@@ -84,7 +84,7 @@ def test_turning_does_not_depend_on_how_often_one_looks(rate, wanted, angle, ste
     once = spin(angle, rate, wanted, sum(steps), 0.03)
     assert (at, speed) == pytest.approx(once, abs=1e-9)
     assert spin(angle, 0.0, wanted, 1e-4, 10.0)[1] == pytest.approx(wanted * 1e-5, rel=1e-3, abs=1e-12)
-    assert follow(angle, angle + 1.0, 5.0, 9.0, 0.03)[0] == pytest.approx(angle + 1.0)
+    assert approached(angle, angle + 1.0, 5.0, 9.0, 0.03)[0] == pytest.approx(angle + 1.0)
 
 
 @pytest.mark.parametrize(

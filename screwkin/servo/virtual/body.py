@@ -87,7 +87,7 @@ class Body:
             if self.blocked:
                 self.rate = 0.0
             elif isinstance(drive, ToAngle):
-                self.angle, self.rate = follow(self.angle, drive.angle, dt, drive.speed, self.lag)
+                self.angle, self.rate = approached(self.angle, drive.angle, dt, drive.speed, self.lag)
             else:
                 self.angle, self.rate = spin(self.angle, self.rate, drive.rate, dt, self.lag)
             heat, strained = self.effort**2, abs(self.effort) > torque
@@ -102,7 +102,7 @@ def spin(angle: float, rate: float, wanted: float, dt: float, lag: float) -> tup
     return angle + wanted * dt + lag * (rate - wanted - left), wanted + left
 
 
-def follow(angle: float, goal: float, dt: float, speed: float, lag: float) -> tuple[float, float]:
+def approached(angle: float, goal: float, dt: float, speed: float, lag: float) -> tuple[float, float]:
     """Angle and rate after ``dt`` of d(angle)/dt = (goal - angle)/lag, but no faster than ``speed``."""
     way, sense = abs(goal - angle), math.copysign(1.0, goal - angle)
     bend = speed * lag  # where the first order becomes slower than the limit

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from screwkin.servo.model_file import Mode
 from screwkin.servo.profiles import Profile
 from screwkin.servo.virtual.body import AtRate, Body, Drive, ToAngle
-from screwkin.servo.virtual.frame import Frame
+from screwkin.servo.virtual.frame import CountingFrame
 
 Get = Callable[[str], int]
 """The value of a register by its name; 0 where the model has none."""
@@ -17,7 +17,7 @@ _LEAST_SPEED = 1e-9  # rad/s
 _NOTHING = 1e-6  # share of the torque that turns nothing
 
 
-def drive_of(profile: Profile, mode: Mode, frame: Frame, get: Get, body: Body) -> Drive:
+def drive_of(profile: Profile, mode: Mode, frame: CountingFrame, get: Get, body: Body) -> Drive:
     """What the motor is to do with torque on.
 
     A rate is the servo's own, positive towards greater ticks as it counts them; reversed servos turn the

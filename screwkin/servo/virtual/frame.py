@@ -22,7 +22,7 @@ _QUARTER = 4  # of a turn
 
 
 @dataclass(frozen=True)
-class Frame:
+class CountingFrame:
     """How a servo counts: see the module. ``turn``: positions at which it begins anew, 0 if it counts on."""
 
     profile: Profile
@@ -45,7 +45,7 @@ class Frame:
         return ticks * self.profile.tick + radians_from_ticks(self.profile, 0)
 
 
-def frame_of(profile: Profile, mode: Mode, values: Mapping[str, int]) -> Frame:
+def frame_of(profile: Profile, mode: Mode, values: Mapping[str, int]) -> CountingFrame:
     """The frame of a servo in a mode.
 
     Args:
@@ -64,4 +64,4 @@ def frame_of(profile: Profile, mode: Mode, values: Mapping[str, int]) -> Frame:
         divider = values.get("resolution_divider", 1)
     around = profile.ticks * _TURN / profile.range_deg
     anew = (bool(profile.multi_turn) and not several) or mode == "wheel"
-    return Frame(profile, reverses, offset, divider, round(around) if anew else 0)
+    return CountingFrame(profile, reverses, offset, divider, round(around) if anew else 0)

@@ -13,7 +13,7 @@ TRIPPED = -1
 _GOALS = ("goal_position", "goal_velocity", "goal_current")
 
 
-def judged(
+def write_outcome(
     profile: Profile, facts: ProtocolFacts, mode: Mode, get: Get, register: Register, value: int
 ) -> RequestOutcome:
     """What becomes of a write of a value into a register.

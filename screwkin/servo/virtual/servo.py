@@ -18,8 +18,8 @@ from screwkin.servo.profiles import Profile, Register, baud_from_register, decod
 from screwkin.servo.protocols import codec
 from screwkin.servo.virtual.body import OVERHEAT, OVERLOAD, VOLTAGE, Body, Drive
 from screwkin.servo.virtual.drive import drive_of, torque_share
-from screwkin.servo.virtual.frame import FRAME_REGISTERS, Frame, frame_of
-from screwkin.servo.virtual.rules import TRIPPED, judged
+from screwkin.servo.virtual.frame import FRAME_REGISTERS, CountingFrame, frame_of
+from screwkin.servo.virtual.rules import TRIPPED, write_outcome
 
 BOOT = 0.2
 """How long a servo is silent after a reset [s]."""
@@ -68,7 +68,7 @@ class VirtualServo:
         self._registered: tuple[int, bytes] | None = None
         self._alarms = 0
         self._heard = -math.inf
-        self._frame: tuple[Mode, Frame] | None = None
+        self._frame: tuple[Mode, CountingFrame] | None = None
         for register in profile.registers.values():
             self._put(register, register.initial)
         if shadows:
@@ -217,7 +217,7 @@ class VirtualServo:
             return min(share, rest)
         return share
 
-    def _settings(self) -> tuple[Mode, Frame]:
+    def _settings(self) -> tuple[Mode, CountingFrame]:
         """Mode and frame, as the registers that decide them stand now."""
         if self._frame is None:
             mode = servo_mode(self.profile, {name: self.get(name) for name in mode_registers(self.profile)})
@@ -338,7 +338,7 @@ class VirtualServo:
             if touched.isdisjoint(range(register.address, register.end)):
                 continue
             value = decode(register, int.from_bytes(after[register.address : register.end], "little"))
-            outcome = judged(self.profile, self._facts, self.mode, self._get, register, value)
+            outcome = write_outcome(self.profile, self._facts, self.mode, self._get, register, value)
             if outcome != "done":
                 return outcome
         return "done"
