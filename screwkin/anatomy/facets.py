@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
 
@@ -21,6 +22,10 @@ CORNERS = 8
 """Greatest number of a sole's corners."""
 SLIGHT = 0.01
 """Share of a polygon's area that a corner must add to be worth it."""
+AROUND = 16
+"""Directions whose farthest points tell most others to be no corners of a convex hull."""
+WITHIN = 1e-6
+"""Distance from the edges between them, by the polygon's width, that is beyond rounding."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +98,8 @@ def across(up: Array) -> Array:
 
 def hull_of(flat: Array) -> Array:
     """Indices of the corners of the convex hull of points (N, 2), counter-clockwise; of lines their ends."""
-    order = np.lexsort(flat.T[::-1])
+    outer = _outer(flat)
+    order = outer[np.lexsort(flat[outer].T[::-1])]
 
     def half(indices: Array) -> list[int]:
         chain: list[int] = []
@@ -104,6 +110,21 @@ def hull_of(flat: Array) -> Array:
         return chain
 
     return np.array([*half(order)[:-1], *half(order[::-1])[:-1]] or [int(order[0])], dtype=int)
+
+
+def _outer(flat: Array) -> NDArray[np.int64]:
+    """Indices of points (N, 2) without those well within the polygon of the farthest ones in some directions.
+
+    Source: Akl and Toussaint (1978).
+    """
+    angle = np.arange(AROUND) * (2 * np.pi / AROUND)
+    far = flat[np.argmax(flat @ np.array([np.cos(angle), np.sin(angle)]), axis=0)]
+    edges = np.roll(far, -1, axis=0) - far
+    lengths = np.linalg.norm(edges, axis=1)
+    far, edges = far[lengths > 0], edges[lengths > 0] / lengths[lengths > 0, None]
+    away = flat[:, None] - far
+    inside = edges[:, 0] * away[..., 1] - edges[:, 1] * away[..., 0] > WITHIN * np.ptp(flat, axis=0).min()
+    return np.flatnonzero(~inside.all(axis=1)) if len(far) > 2 else np.arange(len(flat))
 
 
 def _turn(a: Array, b: Array, c: Array) -> float:

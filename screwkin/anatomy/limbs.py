@@ -205,7 +205,8 @@ def _upward(skeleton: Skeleton, symmetry: Symmetry) -> list[Array]:
         base = [e / np.linalg.norm(e)]
 
     def along(e: Array) -> int:
-        return sum(min(abs(s @ e), np.linalg.norm(np.cross(s, e))) < TILT for s in axes)
+        cosines = np.abs(np.array(axes).reshape(-1, 3) @ e)
+        return int(((cosines < TILT) | (1 - cosines**2 < TILT**2)).sum())
 
     chosen: list[Array] = []
     for one in [*base[:1], max([*base, *axes], key=along)]:

@@ -20,7 +20,6 @@ from screwkin.errors import NoSolutionError
 from screwkin.kinematics.body import center_of_mass
 from screwkin.kinematics.serial_chain import SerialChain, residual
 from screwkin.model.robot import Joint, Posture, Robot
-from screwkin.model.state import State
 
 BEND = 0.94
 """Distance of hip and ankle by the greatest one: knees of two equal bones are bent by 40 degrees."""
@@ -119,8 +118,8 @@ def home_of(legs: Legs, rest: Array) -> Home:
         if found is None:
             break
         q, starts = found.q, found.q[None]
-        com = center_of_mass(robot, State(np.eye(4), _both(legs, rest, q, place, rows)))
-        wanted = float(com[0]) - legs.middle[0]
+        com = center_of_mass.formula(robot, IDENTITY, _both(legs, rest, q, place, rows).tolist())
+        wanted = float(com.x) - legs.middle[0]
         off = abs(wanted - place[0])
         if off < STILL * length:
             break

@@ -53,11 +53,6 @@ class Mesh:
         except (QhullError, ValueError):
             return np.unique(self.vertices, axis=0)
 
-    @property
-    def is_upright(self) -> bool:
-        """Whether z is up in the file, or nothing is said of it."""
-        return bool((self.turn == np.eye(3)).all())
-
 
 def hull_faces(points: Array) -> NDArray[np.int64]:
     """Triangles (F, 3), as indices of points (N, 3), of the convex hull of points that lie in no plane."""
@@ -110,6 +105,18 @@ def _read(file: str, changed: int, size: int) -> Mesh:
     for array in (vertices, faces, colours):
         array.flags.writeable = False
     return Mesh(vertices, faces, colours, turn)
+
+
+def upward_axis(file: str | Path) -> str:
+    """Which axis a COLLADA file calls up: X, Y, or Z; its triangles are not read.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    try:
+        return _asset(read_file(file, LARGEST_MESH))[1]
+    except (OSError, ValueError) as wrong:
+        raise InputError(f"mesh {file}: cannot be read ({wrong})") from None
 
 
 def _parts_of(scene: Any) -> tuple[Array, NDArray[np.int64], Array]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, leaves
 from screwkin.errors import InputError, MissingDependencyError
-from screwkin.model.meshes import hull_faces, load_mesh
+from screwkin.model.meshes import hull_faces, load_mesh, upward_axis
 from screwkin.model.records import Box, Link, RobotRecord, Shape, ShapeRole
 
 Faces = NDArray[np.int64]
@@ -162,31 +163,45 @@ def honours_up(robot: RobotRecord) -> bool:
     COLLADA files say which axis is up; RViz and Pinocchio ignore it, PyBullet and Blender honour it, and the
     files of a robot suit either. So the robot decides: the reading in which more of its joints' axes cross,
     and more of its centres of mass lie within, the boxes around its meshes; as the files say, if both suit.
+    The smallest files are asked first, and no more of them than can change what comes out.
     """
-    votes = 0
-    for link in robot.links:
-        for shape in link.shapes:
-            try:
-                if not shape.file.lower().endswith(".dae") or load_mesh(shape.file).is_upright:
-                    continue
-                honoured, ignored = (_suits(robot, link, shape, upright) for upright in (True, False))
-            except (InputError, MissingDependencyError):
-                continue
-            votes += honoured - ignored
+    meshes = [(link, shape) for link in robot.links for shape in link.shapes if _is_turned(shape)]
+    lines = {link.name: _lines(robot, link) for link, _ in meshes}
+    votes, open_votes = 0, sum(len(lines[link.name]) for link, _ in meshes)
+    for link, shape in sorted(meshes, key=lambda pair: Path(pair[1].file).stat().st_size):
+        if votes >= open_votes or votes < -open_votes:
+            break
+        open_votes -= len(lines[link.name])
+        try:
+            votes += _suits(lines[link.name], shape, True) - _suits(lines[link.name], shape, False)
+        except (InputError, MissingDependencyError):
+            continue
     return votes >= 0
 
 
-def _suits(robot: RobotRecord, link: Link, shape: Shape, upright: bool) -> int:
-    """How many axes of a link's joints, and its CoM, meet the box around one of its meshes."""
-    T, own = as_array(shape.pose), _own_points(shape, upright)
-    low, high = own.min(axis=0), own.max(axis=0)
-    near = _NEAR * np.linalg.norm(high - low)
-    lines = [(as_array(link.com), np.zeros(3))] if link.mass else []
-    lines += [
+def _is_turned(shape: Shape) -> bool:
+    """Whether a shape is a mesh whose file calls another axis than z up."""
+    try:
+        return shape.file.lower().endswith(".dae") and upward_axis(shape.file) != "Z"
+    except InputError:
+        return False
+
+
+def _lines(robot: RobotRecord, link: Link) -> list[tuple[Array, Array]]:
+    """A point and a direction of the axes of a link's joints; its CoM, without direction."""
+    com = [(as_array(link.com), np.zeros(3))] if link.mass else []
+    return com + [
         (as_array(joint.screw.s0), as_array(joint.screw.s))
         for joint in robot.tree
         if link.name in (joint.parent, joint.child) and joint.type == "revolute"
     ]
+
+
+def _suits(lines: Sequence[tuple[Array, Array]], shape: Shape, upright: bool) -> int:
+    """How many lines meet the box around a mesh."""
+    T, own = as_array(shape.pose), _own_points(shape, upright)
+    low, high = own.min(axis=0), own.max(axis=0)
+    near = _NEAR * np.linalg.norm(high - low)
     R, p = T[:3, :3], T[:3, 3]
     return sum(_meets((at - p) @ R, s @ R, low - near, high + near) for at, s in lines)
 

@@ -10,7 +10,7 @@ import pytest
 
 from screwkin.errors import InputError, MissingDependencyError
 from screwkin.model.mesh_files import find_mesh, full_path, short_path
-from screwkin.model.meshes import load_mesh
+from screwkin.model.meshes import load_mesh, upward_axis
 from tests.model.meshes import CORNERS, write_dae, write_obj, write_stl
 
 
@@ -23,7 +23,7 @@ def test_corners_of_a_mesh_are_those_of_its_file(tmp_path, write):
     mesh = load_mesh(write(tmp_path / f"a.{write.__name__[-3:].upper()}"))
     np.testing.assert_allclose(in_order(np.unique(mesh.corners, axis=0)), in_order(CORNERS), atol=1e-7)
     assert len(mesh.faces) == 4
-    assert mesh.is_upright
+    np.testing.assert_array_equal(mesh.turn, np.eye(3))
 
 
 @pytest.mark.parametrize(
@@ -36,6 +36,7 @@ def test_corners_of_a_mesh_are_those_of_its_file(tmp_path, write):
 )
 def test_collada_says_which_axis_is_up_and_in_which_unit(tmp_path, up, turned):
     mesh = load_mesh(write_dae(tmp_path / "a.dae", up=up, unit=0.01))
+    assert upward_axis(tmp_path / "a.dae") == up[0]
     wanted = 0.01 * np.array([turned(*corner) for corner in CORNERS])
     found = np.unique(mesh.corners @ mesh.turn.T, axis=0)
     np.testing.assert_allclose(in_order(found), in_order(wanted), atol=1e-9)

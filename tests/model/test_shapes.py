@@ -166,6 +166,28 @@ def test_joints_decide_whether_the_axis_that_a_file_calls_up_is_honoured(tmp_pat
     )
 
 
+@pytest.mark.parametrize("honoured", [True, False])
+@pytest.mark.parametrize("most", [2, 3, 5])
+def test_most_meshes_decide_which_axis_is_up_whichever_are_largest(tmp_path, most, honoured):
+    """A chain of rods whose files say y is up: joints end some of them along z, the others along y."""
+    rng = np.random.default_rng(most)
+    as_said = rng.permutation([honoured] * most + [not honoured] * (most - 1))
+    text = ["<robot name='rods'><link name='l0'/>"]
+    for i, said in enumerate(as_said):
+        file = write_dae(tmp_path / f"{i}.dae", CORNERS * (0.05, 0.05, 1), up="Y_UP")
+        file.write_text(file.read_text() + "\n" * int(rng.integers(1000)))
+        end = 2.8 * np.array((0, -1, 0) if said else (0, 0, 1))
+        text.append(
+            f"<link name='l{i + 1}'><visual><geometry><mesh filename='{i}.dae'/></geometry></visual></link>"
+            f"<joint name='a{i}' type='fixed'><parent link='l0'/><child link='l{i + 1}'/></joint>"
+            f"<link name='e{i}'/><joint name='e{i}' type='revolute'><parent link='l{i + 1}'/><child link='e{i}'/>"
+            f"<origin xyz='{end[0]} {end[1]} {end[2]}'/><axis xyz='1 0 0'/>"
+            "<limit lower='-1' upper='1' effort='1' velocity='1'/></joint>"
+        )
+    robot = parse_urdf("".join([*text, "</robot>"]), str(tmp_path / "rods.urdf")).robot
+    assert honours_up(robot) is honoured
+
+
 def test_a_mirrored_limb_has_mirrored_shapes(tmp_path):
     mesh = write_stl(tmp_path / "a.stl")
     rows = f"""shapes = [
