@@ -52,9 +52,7 @@ def shape_triangles(shape: Shape, upright: bool = True, cell: float = 0.0) -> tu
         MissingDependencyError: trimesh is absent.
     """
     if shape.kind == "mesh":
-        mesh = load_mesh(shape.file)
-        size = np.array(shape.size, dtype=float)
-        own = (mesh.vertices @ mesh.turn.T if upright else mesh.vertices) * size
+        mesh, own = load_mesh(shape.file), _vertices(shape, upright)
         faces, kept = _coarse(own, mesh.faces, cell)
         colours = mesh.colours[kept]
     else:
@@ -92,6 +90,12 @@ def _keys(rows: Faces) -> Faces:
 def box_points(box: Box) -> Array:
     """The corners (8, 3) [m] of a box, in base axes."""
     return as_array(box.center) + 0.5 * _SIGNS * as_array(box.size)
+
+
+def _vertices(shape: Shape, upright: bool) -> Array:
+    """Of a mesh, in the shape's frame."""
+    mesh = load_mesh(shape.file)
+    return (mesh.vertices @ mesh.turn.T if upright else mesh.vertices) * np.array(shape.size, dtype=float)
 
 
 def _own_points(shape: Shape, upright: bool) -> Array:
@@ -199,7 +203,7 @@ def _lines(robot: RobotRecord, link: Link) -> list[tuple[Array, Array]]:
 
 def _suits(lines: Sequence[tuple[Array, Array]], shape: Shape, upright: bool) -> int:
     """How many lines meet the box around a mesh."""
-    T, own = as_array(shape.pose), _own_points(shape, upright)
+    T, own = as_array(shape.pose), _vertices(shape, upright)
     low, high = own.min(axis=0), own.max(axis=0)
     near = _NEAR * np.linalg.norm(high - low)
     R, p = T[:3, :3], T[:3, 3]
