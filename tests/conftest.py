@@ -21,7 +21,7 @@ from screwkin.model import table
 table.parse_robot = cache(table.parse_robot)
 """One robot a text in every process: its programs are recorded once, not anew in every test that loads it."""
 
-FEW = 40
+FEW = 30
 """Random examples of a law, where its test does not say how many; HYPOTHESIS_PROFILE=many draws 2,000."""
 
 settings.register_profile("dev", deadline=None, print_blob=True, max_examples=FEW)

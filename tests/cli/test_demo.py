@@ -20,6 +20,16 @@ def shown(tmp_path_factory):
     return code, story.getvalue(), folder
 
 
+@pytest.fixture
+def without_pictures(monkeypatch):
+    """A demo that draws nothing, neither film nor report: half of its time, and other tests look at them."""
+    import screwkin.cli.simulation as simulation
+
+    monkeypatch.setattr(simulation, "_camera", lambda duration: None)
+    monkeypatch.setattr(simulation, "drawn", lambda draw: ())
+    monkeypatch.setattr(simulation, "write_page", lambda *_: None)
+
+
 def test_the_default_robot_walks_and_the_story_names_every_stage(shown):
     code, story, folder = shown
     assert code == 0
@@ -46,7 +56,7 @@ def test_the_folder_holds_trajectory_verdict_film_and_report(shown):
     assert json.loads((folder / "validation.json").read_text(encoding="utf-8"))["passed"]
 
 
-def test_a_walk_that_falls_ends_with_3_and_json_alone_on_stdout(cli, tmp_path):
+def test_a_walk_that_falls_ends_with_3_and_json_alone_on_stdout(cli, without_pictures, tmp_path):
     gait = tmp_path / "stiff.toml"
     from screwkin.model.library import find_gait
 
@@ -61,7 +71,7 @@ def test_a_walk_that_falls_ends_with_3_and_json_alone_on_stdout(cli, tmp_path):
     assert (called.data["packets"], called.data["servos"]) == (0, None), "nothing is sent that did not pass"
 
 
-def test_a_walk_too_fast_for_the_servos_is_shown_but_not_sent(cli, tmp_path):
+def test_a_walk_too_fast_for_the_servos_is_shown_but_not_sent(cli, without_pictures, tmp_path):
     from screwkin.model.library import find_gait
 
     text = find_gait("walk").read_text(encoding="utf-8")
@@ -74,7 +84,7 @@ def test_a_walk_too_fast_for_the_servos_is_shown_but_not_sent(cli, tmp_path):
     assert not (tmp_path / "out" / "play.npz").exists()
 
 
-def test_json_counts_the_packets_and_tells_how_the_play_ended(cli):
+def test_json_counts_the_packets_and_tells_how_the_play_ended(cli, without_pictures):
     data = cli("demo", "--gait", "smooth", "--steps", 1, "-o", "out", "--json").data
     assert data["packets"] > data["servos"]["frames"] > 100
     assert (data["servos"]["faults"], data["servos"]["state"]) == ([], "hold")

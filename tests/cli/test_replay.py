@@ -32,7 +32,7 @@ def test_what_the_servos_do_to_the_zmp_is_told_and_the_verdict_stays(cli, sent, 
     before = (sent / "validation.json").read_bytes()
     out = tmp_path / "out"
     path, log = sent / "trajectory.npz", sent / "sent" / "play.npz"
-    called = cli("validate", path, "--log", log, "-o", out, "--json")
+    called = cli("validate", path, "--log", log, "--engine", "pybullet", "-o", out, "--json")
     data = called.data
     assert called.code == 0, data["reasons"]
     assert data["replayed_s"] == data["duration_s"] == load_trajectory(path).duration

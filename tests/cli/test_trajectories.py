@@ -202,7 +202,7 @@ def test_elastic_servos_stand_with_compensated_commands_and_tell_every_run(cli, 
 def test_a_robot_too_soft_for_its_weight_is_told_to_fall_in_every_run(cli):
     assert cli("walk", "poppy12", "--steps", 1, "--no-plots", "-o", "out").code == 0
     words = ("validate", "out/trajectory.npz", "--compliant", "--stiffness", 5, "--repeat", "--no-plots")
-    called = cli(*words, "--json")
+    called = cli(*words, "--engine", "mujoco", "--json")
     assert called.code == 3
     assert called.data["fell"] is True
     assert called.data["repeated"]["fallen"] == 4
