@@ -7,9 +7,22 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.se3 import Pose, as_array
-from screwkin.model.robot import Inertia, Link, Robot
+from screwkin.model.robot import Inertia, Joint, Link, Robot
 
 pin: Any = __import__("pinocchio")
+
+
+def depth_first(robot: Robot) -> list[Joint]:
+    """Every joint right before all that it carries: Pinocchio takes a subtree for a stretch of indices.
+
+    In any other order its mass matrix, and with it its constraint dynamics, is wrong without a word.
+    """
+    below = [joint for joint in robot.tree if joint.parent == robot.base_link]
+    order = []
+    while below:
+        order.append(joint := below.pop(0))
+        below = [other for other in robot.tree if other.parent == joint.child] + below
+    return order
 
 
 def constrained(robot: Robot) -> tuple[Any, Any, list[int]]:
@@ -18,8 +31,7 @@ def constrained(robot: Robot) -> tuple[Any, Any, list[int]]:
     model.gravity.linear = np.array([0.0, 0.0, -9.81])
     root = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "root")
     carrier, origin = {robot.base_link: root}, {robot.base_link: np.zeros(3)}
-    for i in robot.traversal:
-        joint = robot.tree[i]
+    for joint in depth_first(robot):
         axis, place = np.array([*joint.screw.s], float), np.array([*joint.screw.s0], float)
         kind = {
             "revolute": lambda a=axis: pin.JointModelRevoluteUnaligned(a),
