@@ -13,8 +13,9 @@ from screwkin.algebra.se3 import Pose, as_array
 from screwkin.analysis.remark import Remark
 from screwkin.errors import MissingDependencyError, ScrewkinError
 from screwkin.kinematics.landmarks import waist_frame
-from screwkin.kinematics.positions import link_displacements, pose_in_base
+from screwkin.kinematics.positions import closure_ends, link_displacements, pose_in_base
 from screwkin.model.robot import Limb, Robot
+from screwkin.model.state import reference_base
 from screwkin.sim.self_collision import touching_at_home
 
 _EXACT, _MEANT = 1e-7, 0.035  # rad: axes that differ by less are parallel, by more are meant to
@@ -64,10 +65,9 @@ def _axes(robot: Robot) -> Iterator[Remark]:
 def _loops(robot: Robot) -> Iterator[Remark]:
     """Closures that do not close at home."""
     D = link_displacements(robot, list(robot.posture("home").q))
-    links = robot.link_names
+    carried = dict(zip(robot.link_names, D, strict=True))
     for closure in robot.closures:
-        a = D[links.index(closure.link_a)] @ closure.frame_a
-        b = D[links.index(closure.link_b)] @ closure.frame_b
+        a, b = closure_ends(closure, carried, reference_base(robot))
         gap = float(np.abs(as_array(a.inverse @ b).astype(float)[:3, 3]).max())
         if gap > _CLOSED:
             what = f"its frames are {1e3 * gap:.3g} mm apart at home"

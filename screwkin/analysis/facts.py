@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from screwkin.algebra.se3 import IDENTITY, ZERO, Vector
+from screwkin.algebra.se3 import IDENTITY, ZERO, Vector, as_array
 from screwkin.errors import UnreachableError, one_of
 from screwkin.mechanism.choice import CLOSED, closed_mechanism, mobility_at
 from screwkin.mechanism.closure import close_loops
@@ -18,7 +18,7 @@ from screwkin.mechanism.network import coupling_twists, network_of_twists
 from screwkin.mechanism.singularity import LimbSingularity, singularity_report
 from screwkin.model.coupled import coupling_of
 from screwkin.model.robot import Robot
-from screwkin.model.state import State, reference_posture
+from screwkin.model.state import State, reference_base, reference_posture
 
 STEPS = 12
 """In which a mechanism goes to imposed coordinates, so that it stays on its branch."""
@@ -120,7 +120,8 @@ def facts_of(
 def _moved(robot: Robot, q: Sequence[float], imposed: Mapping[str, float]) -> list[float]:
     """The posture to which couplings have gone from another one, in steps along which loops close."""
     mechanism = closed_mechanism(robot)
-    state = State(np.eye(4), np.array(q, dtype=float))
+    base = reference_base(robot) if any(c.on_floor for c in robot.closures) else IDENTITY
+    state = State(as_array(base).astype(float), np.array(q, dtype=float))
     start = dict(zip(mechanism.couplings, close_loops(mechanism, state, {}).coordinates, strict=True))
     for share in np.linspace(0, 1, STEPS + 1)[1:]:
         here = {

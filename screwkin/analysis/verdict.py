@@ -48,7 +48,7 @@ class Measured:
     """A verdict in numbers: what ``validation.json`` holds of it. None stands where nothing was measured.
 
     zmp_rms_mm and zmp_max_mm: contact ZMP against the planned one, the larger of x and y; the ``_xy`` fields
-    hold both, and ankle_rms_xy_mm the ankle sensors against the contacts; None where rods push the feet too.
+    hold both, and ankle_rms_xy_mm the ankle sensors against the contacts; None where closures end at feet.
     engine: names of all engines, joined by ``+``; numbers are the worst of them. By the engine's name:
     engine_settings, engines: what each measured, and solver: what finer settings change, None if not tried.
     undecided: the verdict lies within a solver's own scatter; it has not passed.

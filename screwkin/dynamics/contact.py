@@ -176,7 +176,7 @@ def contact_distribution(
             "determined; inverse_dynamics gives the wrench on the base"
         )
     motors = actuated_joints(robot, actuated)
-    loops = Admitted.at(robot, q) if robot.closures else None
+    loops = Admitted.at(robot, q) if robot.loops else None
     if loops:
         qd, qdd = loops.motion(robot, qd, qdd)
     bodies = Bodies.of(robot, T_world_base.R, q)

@@ -16,6 +16,7 @@ from screwkin.dynamics.friction import Grip, limited, pyramids
 from screwkin.errors import InputError, NoSolutionError, ShapeError, UnknownNameError, expect
 from screwkin.kinematics.body import frame_pose
 from screwkin.kinematics.mass import GRAVITY
+from screwkin.mechanism.holds import on_floor
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 
@@ -87,7 +88,8 @@ def contact_forces(
         ContactForces; of JAX arrays in JAX arrays, where friction is not asked for.
 
     Raises:
-        InputError: a fixed base, no contacts, a tip twice, a negative weight; or friction of JAX arrays.
+        InputError: a fixed base, no contacts, a tip twice, a negative weight; friction of JAX arrays; or no
+            contact where a closure holds a tip on the floor.
         UnknownNameError: no such tip.
         NoSolutionError: a sample has no contacts, or they cannot supply what its motion needs.
         ShapeError: a wrong shape, NaN or infinity, or a base pose that is not rigid.
@@ -152,6 +154,11 @@ def _chosen(robot: Robot, contacts: Contacts | None) -> tuple[tuple[ContactPatch
     if not patches:
         raise InputError("no contacts; name the tips that carry the robot, as contacts=['right_foot']")
     tips = [patch.tip for patch in patches]
+    if missing := [tip for tip in on_floor(robot) if tip not in tips]:
+        raise InputError(
+            f"closures hold {', '.join(missing)} of {robot.name} on the floor, which carries them too; name "
+            "them in contacts, without a sole as ContactPatch(tip, points)"
+        )
     if len(set(tips)) < len(tips):
         raise InputError(f"contacts names a tip twice: {', '.join(tips)}; give every tip one patch")
     return tuple(patches), list(pairs.values())

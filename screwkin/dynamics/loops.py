@@ -30,6 +30,7 @@ from screwkin.compiler.program import kept
 from screwkin.errors import InputError, SingularError, one_of
 from screwkin.mechanism.choice import RANK_TOLERANCE, closed_mechanism
 from screwkin.mechanism.closure import closure_errors
+from screwkin.mechanism.holds import refuse_on_floor
 from screwkin.mechanism.least_values import least_values
 from screwkin.mechanism.linkages import motor_joints
 from screwkin.mechanism.mechanism import Mechanism
@@ -51,12 +52,14 @@ def loops_of(robot: Robot) -> Mechanism:
     Raises:
         InputError: a closure is open at the home posture.
     """
-    return closed_mechanism(replace(robot, base="fixed", limbs=(), soles=(), text="", path=""))
+    return closed_mechanism(
+        replace(robot, base="fixed", limbs=(), soles=(), closures=robot.loops, text="", path="")
+    )
 
 
 def driving_joints(robot: Robot) -> tuple[str, ...]:
     """Names of the joints whose rates are independent, in table order: all but those that loops determine."""
-    if not robot.closures:
+    if not robot.loops:
         return robot.joint_names
     primary = set(loops_of(robot).primary)
     return tuple(name for name in robot.joint_names if name in primary)
@@ -214,7 +217,7 @@ def actuated_joints(robot: Robot, names: tuple[str, ...] | None) -> tuple[int, .
         SingularError: at the home posture there is a motion that they cannot drive.
     """
     driving = driving_joints(robot)
-    if names is None and robot.closures:
+    if names is None and robot.loops:
         names = motor_joints(robot)
     if names is None:
         return tuple(robot.joint_names.index(name) for name in driving)
@@ -227,7 +230,7 @@ def actuated_joints(robot: Robot, names: tuple[str, ...] | None) -> tuple[int, .
             f"{', '.join(driving)} would do"
         )
     indices = tuple(robot.joint_names.index(name) for name in robot.joint_names if name in chosen)
-    if robot.closures:
+    if robot.loops:
         motions = Admitted.at(robot, list(reference_posture(robot))).columns
         G = np.array(motions, dtype=float).T[list(indices)]
         if np.linalg.svd(G, compute_uv=False)[-1] < RANK_TOLERANCE:
@@ -238,20 +241,29 @@ def actuated_joints(robot: Robot, names: tuple[str, ...] | None) -> tuple[int, .
     return indices
 
 
+def refuse_held(robot: Robot, what: str) -> None:
+    """Refuse a robot that closures hold on the floor where the floor's wrenches are not asked for.
+
+    Raises:
+        InputError: names the closures.
+    """
+    refuse_on_floor(robot, what, "contact_forces shares out the floor's wrenches, at rest static_forces does")
+
+
 def refuse_loops(robot: Robot, state: State) -> None:
     """Refuse states at which a robot's own loops are open or singular; traced JAX arrays are not looked at.
 
     Raises:
         InputError: a closure is open. SingularError: joints that drive do not determine those that follow.
     """
-    if not robot.closures or robot.is_symbolic or is_traced(state.q):
+    if not robot.loops or robot.is_symbolic or is_traced(state.q):
         return
     mechanism, q = loops_of(robot), np.asarray(state.q, dtype=float)
     q = q.reshape(-1, q.shape[-1])
     columns = dict(zip(robot.joint_names, unstack(q), strict=True))
     still = np.broadcast_to(np.eye(4), (len(q), 4, 4))
     gaps = closure_errors(mechanism, [columns[name] for name in mechanism.couplings], pose_from_array(still))
-    for closure, gap in zip(robot.closures, gaps, strict=True):
+    for closure, gap in zip(robot.loops, gaps, strict=True):
         apart = np.asarray(norm(gap.omega)) + np.asarray(norm(gap.v)) / characteristic_length(robot)
         apart = np.broadcast_to(apart, len(q))
         if (apart > OPEN).any():

@@ -7,7 +7,7 @@ from typing import Any
 from screwkin.algebra.screws import Wrench, wrench_at
 from screwkin.algebra.se3 import NO_TWIST, Pose, Twist, Vector
 from screwkin.dynamics import newton_euler
-from screwkin.dynamics.loops import Admitted, actuated_joints, refuse_loops
+from screwkin.dynamics.loops import Admitted, actuated_joints, refuse_held, refuse_loops
 from screwkin.dynamics.newton_euler import Bodies
 from screwkin.dynamics.zmp import cart_table_zmp, zmp_from_wrench
 from screwkin.kinematics import mass
@@ -65,7 +65,7 @@ def mass_matrix(robot: Robot, T_world_base: Pose, q: Joints) -> Columns:
         drive, in table order].
 
     Raises:
-        InputError: a loop is open.
+        InputError: a loop is open, or closures hold the robot on the floor.
         SingularError: the joints that drive do not determine those that follow, at the state.
         ShapeError: a wrong shape, NaN or infinity, or a base pose that is not rigid.
 
@@ -82,8 +82,9 @@ def mass_matrix(robot: Robot, T_world_base: Pose, q: Joints) -> Columns:
 
     Source: Featherstone (2008), section 6.2; loops: projection on the motions that Davies' N admits.
     """
+    refuse_held(robot, "mass_matrix")
     M = newton_euler.composite_mass_matrix(Bodies.of(robot, T_world_base.R, q))
-    return Admitted.at(robot, q).reduced(M) if robot.closures else M
+    return Admitted.at(robot, q).reduced(M) if robot.loops else M
 
 
 @refusing(refuse_loops)
@@ -120,7 +121,7 @@ def inverse_dynamics(
 
     Raises:
         UnknownNameError: an actuated joint is none.
-        InputError: too few are actuated; or a loop is open.
+        InputError: too few are actuated; a loop is open, or closures hold the robot on the floor.
         SingularError: the joints that drive, or those with motors, do not determine the motion.
         ShapeError: a wrong shape, NaN or infinity, or a base pose that is not rigid.
 
@@ -134,8 +135,9 @@ def inverse_dynamics(
 
     Source: Featherstone (2008), section 5.3; loops: virtual power on the motions that Davies' N admits.
     """
+    refuse_held(robot, "inverse_dynamics")
     motors = actuated_joints(robot, actuated)
-    loops = Admitted.at(robot, q) if robot.closures else None
+    loops = Admitted.at(robot, q) if robot.loops else None
     if loops:
         qd, qdd = loops.motion(robot, qd, qdd)
     wrench, efforts = newton_euler.wrench_and_efforts(

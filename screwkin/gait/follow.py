@@ -13,6 +13,7 @@ from screwkin.gait.plan import Plan, plan
 from screwkin.gait.preview_plan import preview_plan
 from screwkin.gait.realise import differentiate, posed_hands, positions
 from screwkin.gait.record import Gait
+from screwkin.gait.resting import held_arms
 from screwkin.gait.stance import stance_of
 from screwkin.ik.pose_solution import PoseSolution
 from screwkin.mechanism.choice import closed_mechanism
@@ -62,7 +63,9 @@ def follow(robot: Robot, gait: Gait, steps: int, at_rest: tuple[str, ...] = ()) 
         UnreachableError, SingularError, LimitError: a leg cannot follow; names limb, sample and time.
         GaitError, InputError, NoSolutionError: as ``plan`` and ``preview_plan``.
     """
-    whole, notes = stance_of(robot), tuple[str, ...]()
+    held = held_arms(robot)
+    whole, notes = stance_of(robot), tuple(f"{arm} rests: {why}" for arm, why in held.items())
+    at_rest = (*dict.fromkeys((*at_rest, *held)),)
     if gait.arms == "rest":
         at_rest = arms_of(robot)
     while True:

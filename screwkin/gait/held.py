@@ -13,7 +13,7 @@ from screwkin.algebra.screws import carry, displacement
 from screwkin.algebra.se3 import IDENTITY, Pose, Vector, as_array
 from screwkin.errors import InputError
 from screwkin.mechanism.linkages import loop_joints
-from screwkin.model.records import Frame
+from screwkin.model.records import FLOOR, Frame
 from screwkin.model.robot import Closure, Inertia, Joint, Limb, Link, Robot, Sole
 
 Kind = TypeVar("Kind", bound=Joint)
@@ -38,14 +38,15 @@ def with_held_joints(robot: Robot, positions: Mapping[str, float]) -> Robot:
         return robot
     for name in positions:
         robot.joint(name)
-    for closure in robot.closures:
+    for closure in robot.loops:
         loop = {robot.joint_names[i] for i in loop_joints(robot, closure)}
         if loop & set(positions) and not loop <= set(positions):
             raise InputError(
                 f"{robot.name} has closures ({closure.name}); hold all joints of a loop, or none: "
                 f"{', '.join(sorted(loop - set(positions)))} would have to follow"
             )
-    moved, body = {robot.base_link: IDENTITY}, {robot.base_link: robot.base_link}
+    moved = {robot.base_link: IDENTITY, FLOOR: IDENTITY}
+    body = {robot.base_link: robot.base_link, FLOOR: FLOOR}
     held = {c.name: c.ratio * positions[c.leader] + c.offset for c in robot.coupled if c.leader in positions}
     held |= positions
     for i in robot.traversal:

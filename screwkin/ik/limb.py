@@ -18,6 +18,7 @@ from screwkin.ik.solutions import LimbSolutions
 from screwkin.ik.system import checked_free, refuse_free_in_jax
 from screwkin.kinematics.arrays import of_shape
 from screwkin.kinematics.serial_chain import SerialChain
+from screwkin.mechanism.holds import joined_tips
 from screwkin.mechanism.linkages import limb_linkages
 from screwkin.model.robot import Robot, refuse_closures
 
@@ -67,7 +68,8 @@ def limb_ik(
         UnknownNameError: no such limb.
         ShapeError: wrong shape, NaN or infinity, or a pose that is not rigid.
         InputError: an unknown method, or one that does not fit the limb (for
-            ``"closed"`` the message says what the limb's geometry lacks); or JAX arrays, and loops.
+            ``"closed"`` the message says what the limb's geometry lacks); JAX arrays, and loops; or a closure
+            that holds the tip to another limb's.
 
     Example:
         >>> import numpy as np
@@ -82,9 +84,21 @@ def limb_ik(
     if method not in get_args(Method):
         raise InputError(f"method is {method!r}; valid: {', '.join(get_args(Method))}")
     chain = SerialChain.of(robot, limb)
+    _refuse_joined(robot, chain.limb)
     settings, start = settings or DEFAULT, resting(robot, chain) if guess is None else guess
     solve = _linked_ik if limb_linkages(robot, limb) else _free_ik
     return solve(robot, chain, T_base_tip, method, start, settings, least_squares, free)
+
+
+def _refuse_joined(robot: Robot, limb: str) -> None:
+    """Refuse a limb whose tip a closure holds to another limb's, which would have to follow."""
+    tip = robot.limb(limb).tip
+    for pair in joined_tips(robot):
+        if tip in pair:
+            raise InputError(
+                f"{robot.name}: a closure holds {pair[0]} to {pair[1]}, and limb_ik solves one limb alone; "
+                "use solve_pose, where the other one follows"
+            )
 
 
 def _linked_ik(

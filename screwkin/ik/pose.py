@@ -13,6 +13,7 @@ import numpy as np
 
 from screwkin.algebra.scalar import is_jax
 from screwkin.errors import InputError, ShapeError, UnknownNameError, one_of
+from screwkin.ik.held import judged, with_held_targets
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.pose_solution import PoseSolution
 from screwkin.ik.system import checked_free, refuse_free_in_jax
@@ -35,7 +36,8 @@ def solve_pose(
 
     Of several solutions of a limb the one nearest to the guess within the limits is taken, else the nearest
     outside. Joints that limbs share are solved for all of them together; joints that no target needs rest at
-    the guess. Where loops run through a limb, its motors and pins follow, and limits are those of all.
+    the guess. Where loops run through a limb, its motors and pins follow, and limits are those of all. Tips
+    that closures hold, to each other or on the floor, go where the others' targets say.
 
     Args:
         robot: the robot.
@@ -57,7 +59,8 @@ def solve_pose(
     Raises:
         UnknownNameError: a target is no tip.
         ShapeError: wrong shape, NaN or infinity, a pose that is not rigid, or batches that do not fit.
-        InputError: no tip has a target, an unknown method, or JAX arrays for a robot with closures.
+        InputError: no tip has a target, an unknown method, or JAX arrays for a robot with closures; or a
+            closure holds a tip whose target is a position, or a link on the floor that ends no limb.
 
     Example:
         >>> import screwkin as sk
@@ -93,8 +96,11 @@ def solve_pose(
         refuse_free_in_jax(open_)
         rigid = {name: checked(labels[name], target) for name, target in wanted.items()}
         return pose_in_jax(robot, rigid, q, batch, method, settings)
+    if robot.closures:
+        wanted = with_held_targets(robot, wanted)
     try:
-        return solve_whole_body(robot, wanted, q, batch, method, settings, open_)
+        solution = solve_whole_body(robot, wanted, q, batch, method, settings, open_)
+        return judged(robot, solution, settings) if robot.closures else solution
     except ShapeError:  # once more by the caller's names
         for name, target in wanted.items():
             exact_target(labels[name], checked(labels[name], target))

@@ -5,13 +5,14 @@ Formulas over records: q is a sequence of scalars, and a scalar may be a whole b
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TypeVar
 
 from screwkin.algebra.scalar import Scalar, plus, structural, times
 from screwkin.algebra.screws import AT_REST, Displacement, Screw, advance, carry, displacement, transport
 from screwkin.algebra.se3 import IDENTITY, Pose, Twist, Vector
-from screwkin.model.robot import Robot
+from screwkin.model.records import FLOOR
+from screwkin.model.robot import Closure, Robot
 
 
 def successive_displacement(
@@ -97,6 +98,19 @@ def pose_in_base(robot: Robot, displacements: Sequence[Displacement], name: str)
     """Pose of ``base``, a link or a tip in the base frame."""
     link, home = robot.frame(name)
     return displacements[robot.link_names.index(link)] @ home
+
+
+def closure_ends(closure: Closure, carried: Mapping[str, Displacement], T: Pose) -> tuple[Pose, Pose]:
+    """Poses of a closure's two frames in the base frame.
+
+    Args:
+        closure: of a robot.
+        carried: displacement of every link, by its name, in base axes.
+        T: pose of the base in the world, on whose floor one of the frames may stand.
+    """
+    sides = ((closure.link_a, closure.frame_a), (closure.link_b, closure.frame_b))
+    a, b = (T.inverse @ home if link == FLOOR else carried[link] @ home for link, home in sides)
+    return a, b
 
 
 def frame_jacobian(robot: Robot, twists: Sequence[Twist], name: str) -> dict[int, Twist]:

@@ -34,7 +34,7 @@ from screwkin.kinematics.positions import link_displacements
 from screwkin.mechanism.graph import CouplingGraph, cut_set_matrix
 from screwkin.mechanism.mechanism import Mechanism, welded_links
 from screwkin.mechanism.scaling import centre
-from screwkin.mechanism.virtual_chain import FLOOR
+from screwkin.model.records import FLOOR
 from screwkin.model.robot import Closure, Joint, Robot
 from screwkin.model.state import State
 
@@ -147,7 +147,7 @@ def default_contacts(robot: Robot) -> Names:
     """Closures that stand on the floor or join tips; where a floating base then hangs in the air, soles."""
     ends = {limb.link for limb in robot.limbs} | {FLOOR}
     joined = [c for c in robot.closures if {c.link_a, c.link_b} <= ends]
-    standing = any(FLOOR in (c.link_a, c.link_b) for c in joined)
+    standing = any(closure.on_floor for closure in joined)
     soled = {sole.limb for sole in robot.soles}
     tips = [limb.tip for limb in robot.limbs if limb.name in soled]
     if robot.base == "fixed" or standing:

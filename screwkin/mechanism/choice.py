@@ -17,7 +17,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import Pose, norm, rotation_log
 from screwkin.compiler.program import kept
 from screwkin.errors import InputError, SingularError, expect, one_of
-from screwkin.kinematics.positions import link_displacements
+from screwkin.kinematics.positions import closure_ends, link_displacements
 from screwkin.mechanism.graph import CouplingGraph
 from screwkin.mechanism.mechanism import WAIST, Mechanism, unchosen
 from screwkin.mechanism.network import coupling_twists, network_of_twists
@@ -178,8 +178,7 @@ def check_closed(mechanism: Mechanism, T: Pose, q: Sequence[float]) -> None:
     length = characteristic_length(robot)
     where = "at the posture where the mechanism is examined"
     for closure in robot.closures:
-        a, b = carried[closure.link_a] @ closure.frame_a, carried[closure.link_b] @ closure.frame_b
-        if gap := _gap(a, b, length):
+        if gap := _gap(*closure_ends(closure, carried, T), length):
             raise InputError(
                 f"{robot.name}: closure {closure.name} is open by {gap} {where}; give a posture home that "
                 "closes it, by formulas or to nine digits (mechanism.closure.nearest_closed finds one)"

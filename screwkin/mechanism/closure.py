@@ -27,7 +27,7 @@ from screwkin.algebra.se3 import (
 )
 from screwkin.errors import InputError, NoSolutionError, one_of
 from screwkin.kinematics import limits
-from screwkin.kinematics.positions import link_displacements, pose_in_base
+from screwkin.kinematics.positions import closure_ends, link_displacements, pose_in_base
 from screwkin.kinematics.status import CLOSED, SINGULAR, Status
 from screwkin.mechanism.chains import chain_coordinates, chain_pose
 from screwkin.mechanism.mechanism import Mechanism, unchosen
@@ -96,7 +96,7 @@ def closure_errors(mechanism: Mechanism, coordinates: Sequence[Scalar], fixed: P
             end = chain_pose(chain.couplings, values, mechanism.held(chain, base))
             ends.append((base @ pose_in_base(robot, D, chain.limb.tip), end, base.p))
     for closure in robot.closures:
-        a, b = carried[closure.link_a] @ closure.frame_a, carried[closure.link_b] @ closure.frame_b
+        a, b = closure_ends(closure, carried, base)
         ends.append((base @ a, base @ b, base.p))
     for chain in mechanism.added:
         start, end = chain.ends(robot, base, carried)

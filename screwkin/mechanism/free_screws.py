@@ -19,7 +19,7 @@ from screwkin.mechanism.mechanism import Mechanism, welded_links
 from screwkin.mechanism.rates import block_rows
 from screwkin.mechanism.scaling import centre, characteristic_length
 from screwkin.mechanism.screw_text import ScrewLine, twist_screw, wrench_screw
-from screwkin.mechanism.virtual_chain import FLOOR
+from screwkin.model.records import FLOOR
 
 ALONE = 0.05
 """Share of the largest circuit's wrench below which another circuit takes no part."""

@@ -1,8 +1,8 @@
 """The linkages of a robot: its loops, what each limb asks of them, and which of their joints have motors.
 
-A linkage is one loop, or several that share joints. Of the joints in it, as many as it has freedoms can be
-imposed. Limbs impose those on the way to their tip (a knee, an ankle's pitch and roll), motors the ones that
-they turn; all others follow.
+A linkage is one loop, or several that share joints; what holds tips is none (``holds``). Of the joints in it,
+as many as it has freedoms can be imposed. Limbs impose those on the way to their tip (a knee, an ankle's
+pitch and roll), motors the ones that they turn; all others follow.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from screwkin.algebra.se3 import IDENTITY
 from screwkin.compiler.program import kept
 from screwkin.errors import InputError
 from screwkin.mechanism.choice import check_closed, independent
+from screwkin.mechanism.holds import holds
 from screwkin.mechanism.mechanism import Mechanism, unchosen
 from screwkin.mechanism.network import coupling_twists, network_of_twists
 from screwkin.mechanism.scaling import referenced
@@ -71,21 +72,27 @@ def linkages(robot: Robot) -> tuple[Linkage, ...]:
     """
     if not robot.closures:
         return ()
-    check_closed(_bare(robot), reference_base(robot), reference_posture(robot))
-    loops = [loop_joints(robot, closure) for closure in robot.closures]
+    check_closed(unchosen(robot), reference_base(robot), reference_posture(robot))
+    closures = _tying(robot)
+    loops = [loop_joints(robot, closure) for closure in closures]
     moved = np.zeros((len(loops), len(robot.joints)), dtype=np.int64)
     for row, loop in enumerate(loops):
         moved[row, list(loop)] = 1
     return tuple(
-        _linkage(robot, tuple(robot.closures[row] for row in rows), tuple(columns))
+        _linkage(robot, tuple(closures[row] for row in rows), tuple(columns))
         for rows, columns in components(moved)
     )
 
 
+def _tying(robot: Robot) -> tuple[Closure, ...]:
+    """Closures that tie joints to one another: neither on the floor, nor holding tips."""
+    held = [hold.closure for hold in holds(robot)]
+    return tuple(closure for closure in robot.loops if closure not in held)
+
+
 def loop_joints(robot: Robot, closure: Closure) -> tuple[int, ...]:
     """Indices in q of the joints that move in a loop."""
-    loop = set(robot.path_to(closure.link_a)) ^ set(robot.path_to(closure.link_b))
-    return tuple(sorted({robot.gears[i][0] for i in loop}))
+    return tuple(sorted({robot.gears[i][0] for i in robot.around(closure)}))
 
 
 @kept
@@ -173,7 +180,7 @@ def _imposed(robot: Robot, joints: Iterable[int], rank: Callable[[int], object])
 
 def _bare(robot: Robot) -> Mechanism:
     """The loops alone."""
-    return unchosen(replace(robot, limbs=(), soles=()))
+    return unchosen(replace(robot, limbs=(), soles=(), closures=_tying(robot)))
 
 
 @kept

@@ -21,8 +21,9 @@ from screwkin.mechanism import graph as graphs
 from screwkin.mechanism.chains import SPATIAL, check_chain, held_pose
 from screwkin.mechanism.followers import tip_chain
 from screwkin.mechanism.graph import CouplingGraph
-from screwkin.mechanism.virtual_chain import FLOOR, VirtualChain
+from screwkin.mechanism.virtual_chain import VirtualChain
 from screwkin.model.display import html_table, listing
+from screwkin.model.records import FLOOR
 from screwkin.model.robot import Closure, Robot
 
 WAIST = "waist"
@@ -229,7 +230,8 @@ def coupling_graph(
 ) -> CouplingGraph:
     """Vertices and directed edges of the whole mechanism; closures weld the links that they join into one.
 
-    Further chains come behind all free joints, coupled joints last, in table order.
+    Further chains come behind all free joints, coupled joints last, in table order. The chain of a tip that a
+    closure holds on the floor is a circuit of its own, which cannot move.
 
     Raises:
         InputError: a further chain leads from a link to itself.
@@ -252,7 +254,7 @@ def coupling_graph(
 
     def add_chain(chain: VirtualChain) -> None:
         start, end = (welded[link] for link in chain.links(robot))
-        if start == end:
+        if start == end and chain.limb is None:
             raise InputError(
                 f"chain {chain.name}: {chain.start} and {chain.end} are the same body; name frames of two"
             )

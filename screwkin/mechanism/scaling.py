@@ -34,10 +34,10 @@ def characteristic_length(robot: Robot) -> float:
     and no loop count only where there are no others. A robot whose axes and tips all meet has size 1 m.
     """
     sizes = [float(max(limb_levers(robot, limb), default=0.0)) for limb in robot.limbs]
-    loops = [set(robot.path_to(c.link_a)) ^ set(robot.path_to(c.link_b)) for c in robot.closures]
+    loops = [robot.around(closure) for closure in robot.closures]
     if not robot.limbs and not robot.closures:
-        loops = [set(range(len(robot.tree)))]
-    sizes += [_radius([robot.tree[i].screw for i in sorted(loop)]) for loop in loops]
+        loops = [tuple(range(len(robot.tree)))]
+    sizes += [_radius([robot.tree[i].screw for i in loop]) for loop in loops]
     size = max(sizes, default=0.0)
     return size if size > 1e-9 else 1.0
 

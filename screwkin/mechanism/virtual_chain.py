@@ -14,10 +14,9 @@ from screwkin.algebra.screws import Displacement
 from screwkin.algebra.se3 import IDENTITY, ZERO, Pose, Rotation, Twist, Vector
 from screwkin.errors import InputError, ShapeError, UnknownNameError, expect
 from screwkin.mechanism.pairs import check_pairs, pair_coordinates, pair_names, pair_pose, pair_screws
+from screwkin.model.records import FLOOR
 from screwkin.model.robot import Limb, Robot
 from screwkin.model.state import RIGID
-
-FLOOR = "floor"
 
 Frame = tuple[tuple[Scalar, ...], ...]
 """A pose as four rows, which can be compared."""

@@ -21,6 +21,8 @@ JointType = Literal["revolute", "prismatic", "helical"]
 ShapeKind = Literal["box", "cylinder", "sphere", "capsule", "mesh"]
 ShapeRole = Literal["visual", "collision"]
 LimbKind = Literal["leg", "arm"]
+FLOOR = "floor"
+"""Name of what the robot stands on, which a closure may name like a link: its frames are the world's."""
 LIMIT_TOLERANCE = 1e-9
 """Excess over a joint limit [rad or m] that counts as rounding: one number for the whole package."""
 
@@ -123,13 +125,21 @@ class CoupledJoint(Joint):
 
 @dataclass(frozen=True)
 class Closure:
-    """Two frames on two links that must coincide: it closes a loop of the tree."""
+    """Two frames on two links that must coincide: it closes a loop.
+
+    One of the links may be the ``FLOOR``, whose frame is given in the world.
+    """
 
     name: str
     link_a: str
     frame_a: Pose
     link_b: str
     frame_b: Pose
+
+    @property
+    def on_floor(self) -> bool:
+        """Whether it holds a link on the floor."""
+        return FLOOR in (self.link_a, self.link_b)
 
 
 @dataclass(frozen=True)

@@ -18,6 +18,7 @@ from screwkin.model.inertias import impossible
 from screwkin.model.reading import read_table
 from screwkin.model.record_faults import check_records, vars_of
 from screwkin.model.records import (
+    FLOOR,
     Box,
     Closure,
     CoupledJoint,
@@ -238,6 +239,16 @@ class Robot(RobotRecord):
             path.append(i)
             link = self.tree[i].parent
         return tuple(reversed(path))
+
+    @cached_property
+    def loops(self) -> tuple[Closure, ...]:
+        """Closures between two links: they tie joints to one another, wherever the base is."""
+        return tuple(closure for closure in self.closures if not closure.on_floor)
+
+    def around(self, closure: Closure) -> tuple[int, ...]:
+        """Indices in ``tree`` of the joints in a closure's loop; on the floor, of those to its link."""
+        a, b = ({*self.path_to(x)} if x != FLOOR else set() for x in (closure.link_a, closure.link_b))
+        return tuple(sorted(a ^ b))
 
     def link(self, name: str) -> Link:
         """The link of that name; UnknownNameError lists the valid ones."""

@@ -131,12 +131,12 @@ class JointRow(Row):
 
 
 class ClosureRow(Row):
-    """[[closure]]: two frames on two links that coincide."""
+    """[[closure]]: two frames that coincide, on two links or on a link and the floor."""
 
     name: Name = Field(description="name of the closure")
     link_a: Name = Field(description="name of a link")
     frame_a: FrameRow = Field(description="{ xyz = [x, y, z], rpy = [roll, pitch, yaw] } on link_a")
-    link_b: Name = Field(description="name of another link")
+    link_b: Name = Field(description='name of another link; or "floor", whose frame is in the world')
     frame_b: FrameRow = Field(description="{ xyz = [x, y, z], rpy = [roll, pitch, yaw] } on link_b")
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from screwkin.algebra.se3 import Pose, Vector
 from screwkin.model.checks import sole_faults
 from screwkin.model.coupled import tightened
-from screwkin.model.records import Inertia, Joint, RobotRecord, Shape, ShapeRole
+from screwkin.model.records import FLOOR, Inertia, Joint, RobotRecord, Shape, ShapeRole
 from screwkin.model.structure import RESERVED
 from screwkin.model.values import COUPLINGS, NAME, UNIT_TOLERANCE
 
@@ -44,6 +44,7 @@ def _names_certified(robot: RobotRecord) -> bool:
         if len({row.name for row in rows}) < len(rows) or not all(NAME.fullmatch(row.name) for row in rows):
             return False
     named = {link.name for link in links}
+    closed = named | ({FLOOR} if robot.base == "floating" else set())
     tips, legs = {limb.tip for limb in limbs}, {limb.name for limb in limbs if limb.kind == "leg"}
     soled = {sole.limb for sole in robot.soles}
     return (
@@ -52,7 +53,8 @@ def _names_certified(robot: RobotRecord) -> bool:
         and robot.base in ("floating", "fixed")
         and _is_tree(robot.base_link, named, joints)
         and ("base" not in named or robot.base_link == "base")
-        and all(c.link_a != c.link_b and {c.link_a, c.link_b} <= named for c in robot.closures)
+        and FLOOR not in named
+        and all(c.link_a != c.link_b and {c.link_a, c.link_b} <= closed for c in robot.closures)
         and len(tips) == len(limbs)
         and not tips & {*named, *RESERVED}
         and not {frame.name for frame in robot.frames} & {*named, *tips, *RESERVED}

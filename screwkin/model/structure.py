@@ -12,9 +12,10 @@ from typing import NamedTuple
 from screwkin.errors import Fault, near
 from screwkin.model.expression import listed
 from screwkin.model.mirror import closes_within, is_sided, limb_part, swapped
+from screwkin.model.records import FLOOR
 from screwkin.model.rows import Rows, TableEntry
 
-RESERVED = ("base", "waist", "floor", "world")
+RESERVED = ("base", "waist", FLOOR, "world")
 """Frames and chains of every mechanism; no tip may have such a name."""
 
 
@@ -44,9 +45,19 @@ def structure_faults(rows: Rows, mirrored: Iterable[Mirrored]) -> Iterator[Fault
     yield from _unknown(rows, named)
     yield from _tree_faults(rows)
     yield from _sole_faults(rows, named)
+    yield from _closure_faults(rows)
+
+
+def _closure_faults(rows: Rows) -> Iterator[Fault]:
+    """Closures of one link with itself, and with the floor where the base is fixed to it."""
+    fixed, base = rows.robot.text("base") == "fixed", rows.robot.text("base_link")
     for entry in rows["closure"]:
         if entry.text("link_a") and entry.text("link_a") == entry.text("link_b"):
             yield Fault(entry.where, "link_b", f"is {entry.text('link_b')!r} again", "Close two links")
+        for key in ("link_a", "link_b"):
+            if fixed and entry.text(key) == FLOOR:
+                fix = f"Write {base!r}, with the frame in base axes"
+                yield Fault(entry.where, key, "is the floor, to which the base is fixed", fix)
 
 
 def carried_links(rows: Rows) -> dict[str, str]:
@@ -141,6 +152,8 @@ def _duplicates(named: list[Named], base: str) -> Iterator[Fault]:
         if kind == "link" and name == "base" and name != base:
             fix = 'Rename it: frame "base" is the base link\'s'
             yield Fault(where, key, "link 'base' is not base_link", fix)
+        if kind == "link" and name == FLOOR:
+            yield Fault(where, key, f"link {name!r} has the name of what robots stand on", "Rename the link")
         if kind in ("tip", "frame") and name in links:
             yield Fault(
                 where, key, f"{kind} {name!r} has the name of a link", f"Rename the {kind} or the link"
@@ -160,12 +173,17 @@ def _unknown(rows: Rows, named: list[Named]) -> Iterator[Fault]:
         "limb": ("link",),
         "frame": ("link",),
     }
-    places = [(rows.robot, "base_link")]
-    places += [(entry, key) for table, keys in uses.items() for entry in rows[table] for key in keys]
-    for entry, key in places:
+    places = [(rows.robot, "base_link", links)]
+    places += [
+        (entry, key, [*links, FLOOR] if table == "closure" else links)
+        for table, keys in uses.items()
+        for entry in rows[table]
+        for key in keys
+    ]
+    for entry, key, known in places:
         name = entry.text(key)
-        if name and name not in links:
-            fix = f"{near(name, links)}Links: {listed(links)}"
+        if name and name not in known:
+            fix = f"{near(name, known)}Links: {listed(known)}"
             yield Fault(entry.where, key, f"there is no link {name!r}", fix)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import Pose, as_array, pose_from_array
+from screwkin.model.records import FLOOR
 from screwkin.model.robot import Robot
 from screwkin.model.urdf import urdf_frames
 from screwkin.sim.bodies import SimBody
@@ -32,8 +33,11 @@ def close_in_mujoco(mj: Any, spec: Any, robot: Robot, bodies: Mapping[str, tuple
         ends = ((closure.link_a, closure.frame_a), (closure.link_b, closure.frame_b))
         names = []
         for side, (link, frame) in zip("ab", ends, strict=True):
-            element, body = bodies[link]
-            T, quat = body.pose(frame), np.zeros(4)
+            element, T = spec.worldbody, as_array(frame).astype(float)
+            if link != FLOOR:
+                element, body = bodies[link]
+                T = body.pose(frame)
+            quat = np.zeros(4)
             mj.mju_mat2Quat(quat, np.ascontiguousarray(T[:3, :3]).ravel())
             names.append(f"{closure.name} {side}")
             element.add_site(name=names[-1], pos=T[:3, 3], quat=quat)
@@ -62,7 +66,13 @@ def close_in_pybullet(
     frames = urdf_frames(robot)
 
     def end(link: str, frame: Pose) -> tuple[int, list[float], list[float]]:
-        """The engine's index of a link; position and quaternion of a frame from its inertial frame."""
+        """The engine's index of a link; position and quaternion of a frame from its inertial frame.
+
+        Of the floor: of the frame in the world.
+        """
+        if link == FLOOR:
+            T = as_array(frame).astype(float)
+            return -1, T[:3, 3].tolist(), quat_xyzw(T[:3, :3])
         index = links.index(link) - 1
         info = p.getDynamicsInfo(body, index, **client)
         inertial = np.eye(4)
@@ -72,10 +82,12 @@ def close_in_pybullet(
         return index, T[:3, 3].tolist(), quat_xyzw(T[:3, :3])
 
     for closure in robot.closures:
-        a, place_a, turn_a = end(closure.link_a, closure.frame_a)
-        b, place_b, turn_b = end(closure.link_b, closure.frame_b)
+        ends = ((closure.link_a, closure.frame_a), (closure.link_b, closure.frame_b))
+        first, second = sorted(ends, key=lambda side: side[0] == FLOOR)  # the engine's world comes second
+        (a, place_a, turn_a), (b, place_b, turn_b) = end(*first), end(*second)
+        other = -1 if second[0] == FLOOR else body
         weld = p.createConstraint(
-            body, a, body, b, p.JOINT_FIXED, [0.0] * 3, place_a, place_b, turn_a, turn_b, **client
+            body, a, other, b, p.JOINT_FIXED, [0.0] * 3, place_a, place_b, turn_a, turn_b, **client
         )
         p.changeConstraint(weld, maxForce=UNLIMITED, erp=ERP, **client)
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array
+from screwkin.mechanism.holds import on_floor
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 from screwkin.sim.backend import Backend, Command, Observation
@@ -38,7 +39,8 @@ class Run:
     engine, servo, settings: see ``Backend``; dt [s];
     time (K,) [s] of the trajectory, negative while settling; planned_base, T_world_base (K, 4, 4);
     q_planned, q, qd, torque (K, n); T_world_foot (K, feet, 4, 4); ground_wrench (K, 6): [m; f] of all
-    contacts about the world origin; foot_force (K, feet, 3) of the contacts of the legs' last links;
+    contacts about the world origin; foot_force (K, feet, 3) of the contacts of the legs' last links, of feet
+    that closures hold on the floor by their ankles' sensors;
     ankle_wrench (K, feet, 6): ground wrench by the ankle sensors; touched: other links that met the floor;
     fallen_at [s], None if it stood to the end.
     """
@@ -128,9 +130,18 @@ def _columns(robot: Robot, seen: list[Observation]) -> dict[str, Any]:
     names = ("T_world_base", "q", "qd", "torque", "T_world_foot", "ankle_wrench")
     columns: dict[str, Any] = {name: np.array([getattr(o, name) for o in seen]) for name in names}
     feet = {limb.link: i for i, limb in enumerate(limb for limb in robot.limbs if limb.kind == "leg")}
-    rows = [(k, c.link, *c.point, *c.force) for k, o in enumerate(seen) for c in o.contacts]
+    held = [robot.limb(tip).link for tip in on_floor(robot)]
+    rows = [
+        (k, c.link, *c.point, *c.force)
+        for k, o in enumerate(seen)
+        for c in o.contacts
+        if c.link not in held or c.link not in feet
+    ]
     wrench = np.zeros((len(seen), 6))
     forces = np.zeros((len(seen), len(feet), 3))
+    for link in set(held) & set(feet):  # contact and closure share what they carry: its ankle feels both
+        wrench += columns["ankle_wrench"][:, feet[link]]
+        forces[:, feet[link]] = columns["ankle_wrench"][:, feet[link], 3:]
     if rows:
         step = np.array([row[0] for row in rows])
         numbers = np.array([row[2:] for row in rows])
