@@ -180,7 +180,8 @@ def test_most_meshes_decide_which_axis_is_up_whichever_are_largest(tmp_path, mos
         text.append(
             f"<link name='l{i + 1}'><visual><geometry><mesh filename='{i}.dae'/></geometry></visual></link>"
             f"<joint name='a{i}' type='fixed'><parent link='l0'/><child link='l{i + 1}'/></joint>"
-            f"<link name='e{i}'/><joint name='e{i}' type='revolute'><parent link='l{i + 1}'/><child link='e{i}'/>"
+            f"<link name='e{i}'/><joint name='e{i}' type='revolute'>"
+            f"<parent link='l{i + 1}'/><child link='e{i}'/>"
             f"<origin xyz='{end[0]} {end[1]} {end[2]}'/><axis xyz='1 0 0'/>"
             "<limit lower='-1' upper='1' effort='1' velocity='1'/></joint>"
         )
