@@ -20,7 +20,7 @@ from screwkin.servo.budget import ADAPTER, budget
 from screwkin.servo.bus import Bus
 from screwkin.servo.frames import Frames
 from screwkin.servo.gate import Bounds
-from screwkin.servo.guarded import Place
+from screwkin.servo.guarded import OwnGuard, Place
 from screwkin.servo.leave import EndState
 from screwkin.servo.player import PlayOutcome, PlaySettings, describe
 from screwkin.servo.servo_map import ServoMap
@@ -101,17 +101,19 @@ def send(
             place = Place(port, servos.baud, rs485, servos.protocol)
             outcome = played_on_port(may, settings, log, place)
         else:
-            outcome = played(virtual_bus(may.robot, faults, seed), may, settings, log, {"port": "virtual"})
+            bus, guard = virtual_bus(may.robot, faults, seed)
+            outcome = played(bus, may, settings, log, {"port": "virtual"}, guard)
         facts["log"] = str(log_of(log))
     return _print_outcome(outcome, facts, bounds, as_json)
 
 
-def virtual_bus(robot: Robot, faults: Sequence[InjectedFault] = (), seed: int = 0) -> Bus:
-    """Virtual servos of the robot in its posture ``home``, or at zero, on a simulated clock."""
+def virtual_bus(robot: Robot, faults: Sequence[InjectedFault] = (), seed: int = 0) -> tuple[Bus, OwnGuard]:
+    """Virtual servos of the robot in its posture ``home``, or at zero, in simulated time; and their guard."""
     servos, clock = ServoMap.of(robot), SimulatedClock()
     mounted = virtual_servos(robot, return_delay=_RETURN_DELAY)
     line = VirtualBus(mounted, clock, servos.baud, faults, seed, adapter=ADAPTER)
-    return Bus(line, servos.protocol, servos.baud, clock, opener=line.reopened)
+    bus = Bus(line, servos.protocol, servos.baud, clock)
+    return bus, OwnGuard(bus, line.reopened)
 
 
 def _print_dry(path: Path, frames: Frames, bounds: Bounds, facts: dict[str, Any], as_json: bool) -> None:

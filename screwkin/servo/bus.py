@@ -8,7 +8,6 @@ bound, the names of its error bits, and statistics of its round trips.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from functools import partial
 from typing import Any, Literal
 
@@ -34,7 +33,6 @@ from screwkin.servo.protocols import codec
 
 _MOST_STRANGERS = 8  # sound packets of other servos that are passed over
 
-_REOPENING = 0.05  # s, from one try to open a lost port to the next
 PATIENCE = 0.050
 """Time [s] that a reply may take until round trips were measured: the slowest adapters hold it back 40 ms."""
 
@@ -53,7 +51,6 @@ class Bus:
         retries: how often an exchange is repeated that got no sound reply.
         patience: time [s] that a reply may take beyond that of its bytes: return delay and adapter.
         port: its name, for messages.
-        opener: opens the line anew after a loss; None: it cannot be.
     """
 
     def __init__(
@@ -66,11 +63,10 @@ class Bus:
         retries: int = 1,
         patience: float = PATIENCE,
         port: str = "",
-        opener: Callable[[], ByteLine] | None = None,
     ) -> None:
         sdk = _driver()
         self.line, self.protocol, self.baud, self.retries = line, protocol, baud, retries
-        self.port, self._opener = port, opener
+        self.port = port
         self.clock: Clock = clock or MonotonicClock()
         self.statistics = Statistics()
         self._sdk = sdk
@@ -91,22 +87,6 @@ class Bus:
     def close(self) -> None:
         """Give the line back; what the servos do is not changed by it."""
         self.line.close()
-
-    def reopen(self, within: float) -> bool:
-        """Open the port anew, tried for so long [s], as after a plug that slipped; whether it is open."""
-        if self._opener is None:
-            return False
-        end = self.clock.now() + within
-        with suppress(Exception):  # a line that is gone may raise anything
-            self.line.close()
-        while True:
-            try:
-                self.line = self._port.line = self._opener()
-                return True
-            except OSError:
-                if self.clock.now() >= end:
-                    return False
-                self.clock.sleep(_REOPENING)
 
     def ping(self, id: int) -> int:
         """Model number of the servo.

@@ -14,6 +14,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from io import BytesIO
@@ -22,14 +23,17 @@ from types import MappingProxyType
 from typing import Any, Protocol
 
 from screwkin.errors import SafetyError
+from screwkin.servo.bus import Bus
 from screwkin.servo.gate import Bounds
-from screwkin.servo.leave import EndState, Final
+from screwkin.servo.leave import LASTS, EndState, Final, leave_anew
 from screwkin.servo.line import ByteLine
 from screwkin.servo.packets import ProtocolName
 
-READY, BEAT, DISMISSED, TAKE_OVER, GONE = b"r", b".", b"d", b"t", b""
+READY, BEAT, DISMISSED, GONE = b"r", b".", b"d", b""
 """What they say: the guardian that it runs, and that it has its charge; the player that it lives, that all is
-well, that it cannot go on; nothing more."""
+well; nothing more."""
+TAKE_OVER: Mapping[EndState, bytes] = MappingProxyType({"hold": b"h", "limp": b"l"})
+"""What the player says that cannot reach the servos, by the state that they are to be left in."""
 
 _STARTS = 30.0  # s that a guardian may take to start
 _ENDS = 5.0  # s to end, beyond what it may try
@@ -51,7 +55,7 @@ class Charge:
     """What a guardian is to do.
 
     place, bounds: of the servos. state: to leave them in. patience [s]: for an answer. silence [s] without a
-    beat, after which the player hangs. lasts [s]: how long to try. player: its process. journal: of the play.
+    beat, after which the player hangs. player: its process. journal: of the play.
     """
 
     place: Place
@@ -61,7 +65,6 @@ class Charge:
     silence: float
     player: int
     journal: Path
-    lasts: float = 5.0
 
 
 class Guard(Protocol):
@@ -78,7 +81,7 @@ class Guard(Protocol):
     def dismiss(self) -> None:
         """The servos are in a known state."""
 
-    def take_over(self) -> Final | None:
+    def take_over(self, state: EndState) -> Final | None:
         """The player cannot reach the servos; how they were left then, None if nobody can."""
 
     def close(self) -> None:
@@ -86,7 +89,7 @@ class Guard(Protocol):
 
 
 class NoGuard:
-    """Nobody: where the servos are virtual ones of this very process, and end with it."""
+    """Nobody: where a system has no processes, or servos end with this one."""
 
     lost = False
 
@@ -99,12 +102,36 @@ class NoGuard:
     def dismiss(self) -> None:
         """Nothing to do."""
 
-    def take_over(self) -> Final | None:
+    def take_over(self, state: EndState) -> Final | None:
         """Nobody can."""
         return None
 
     def close(self) -> None:
         """Nothing to do."""
+
+
+class OwnGuard(NoGuard):
+    """This very process, for virtual servos that end with it: their line may be lost, and opened anew.
+
+    Args:
+        bus: whose line it is.
+        opened: opens it; raises OSError where there is none.
+    """
+
+    def __init__(self, bus: Bus, opened: Callable[[], ByteLine]) -> None:
+        self._bus, self._opened = bus, opened
+
+    def arm(self, bounds: Bounds, state: EndState, patience: float, silence: float) -> None:
+        """Note whose servos they are, and how long they may take to answer."""
+        self._bounds, self._patience = bounds, patience
+
+    def take_over(self, state: EndState) -> Final | None:
+        """Have the servos brought into their state."""
+        return leave_anew(self._bounds, self._anew, self._bus.clock, state)
+
+    def _anew(self) -> Bus:
+        bus = self._bus
+        return Bus(self._opened(), bus.protocol, bus.baud, bus.clock, retries=0, patience=self._patience)
 
 
 def no_guardian() -> str:
@@ -178,10 +205,10 @@ class Guardian:
         self._last = math.inf
         self._say(DISMISSED)
 
-    def take_over(self) -> Final | None:
+    def take_over(self, state: EndState) -> Final | None:
         """Have the servos brought into their state; the port must be closed."""
-        self._say(TAKE_OVER)
-        said = b"" if self.lost else self._hear(Charge.lasts + _ENDS)
+        self._say(TAKE_OVER[state])
+        said = b"" if self.lost else self._hear(LASTS + _ENDS)
         try:
             facts = json.loads(said)
             return Final(facts["state"], tuple(facts["unconfirmed"]))
@@ -194,7 +221,7 @@ class Guardian:
             with suppress(OSError):
                 self._process.stdin.close()
         with suppress(subprocess.TimeoutExpired):
-            self._process.wait(Charge.lasts + _ENDS)
+            self._process.wait(LASTS + _ENDS)
 
     def _say(self, data: bytes) -> None:
         pipe = self._process.stdin

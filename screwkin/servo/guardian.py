@@ -23,10 +23,9 @@ from typing import Any, Literal
 
 from screwkin.errors import ScrewkinError
 from screwkin.servo.bus import Bus, open_line
-from screwkin.servo.gate import Gate
 from screwkin.servo.guarded import BEAT, DISMISSED, GONE, READY, TAKE_OVER, Charge
-from screwkin.servo.leave import Final, leave
-from screwkin.servo.line import ByteLine, Clock, MonotonicClock, PortError
+from screwkin.servo.leave import EndState, Final, leave_anew
+from screwkin.servo.line import ByteLine, Clock, MonotonicClock
 from screwkin.servo.log import close_journal
 
 Need = Literal["none", "died", "hung", "asked"]
@@ -37,7 +36,6 @@ _WHY = {
     "hung": "the program that played hung, and was ended",
     "asked": "the program that played could not reach the servos",
 }
-_AGAIN = 0.02  # s between attempts at a port
 _ENDS = 1.0  # s that a player may take to be gone after it was ended
 _IGNORED = ("SIGINT", "SIGHUP", "SIGQUIT", "SIGTERM", "SIGTSTP", "SIGPIPE")
 
@@ -45,8 +43,8 @@ Hear = Callable[[float], bytes | None]
 """Waits so long [s] for what the player says; None if nothing came."""
 
 
-def watch_over(charge: Charge, hear: Hear, end: Callable[[int], None]) -> Need:
-    """Wait until the servos need somebody, or nobody any more.
+def watch_over(charge: Charge, hear: Hear, end: Callable[[int], None]) -> tuple[Need, EndState]:
+    """Wait until the servos need somebody, or nobody any more; why, and the state they are to be left in.
 
     Args:
         charge: whose servos.
@@ -56,40 +54,27 @@ def watch_over(charge: Charge, hear: Hear, end: Callable[[int], None]) -> Need:
     while True:
         said = hear(charge.silence)
         if said == DISMISSED:
-            return "none"
-        if said == TAKE_OVER:
-            return "asked"
+            return "none", charge.state
+        for state, word in TAKE_OVER.items():
+            if said == word:
+                return "asked", state
         if said == GONE:
-            return "died"
+            return "died", charge.state
         if said is None:
             end(charge.player)
             while hear(_ENDS) not in (GONE, None):
                 pass  # what it had said before
-            return "hung"
+            return "hung", charge.state
 
 
-def take_over(charge: Charge, open_port: Callable[[], ByteLine], clock: Clock) -> Final:
-    """Bring the servos into their state, as often as it takes, for as long as the charge says."""
-    until = clock.now() + charge.lasts
-    while True:
-        final = _attempt(charge, open_port, clock)
-        if final.state != "unknown" or clock.now() >= until:
-            return final
-        clock.sleep(_AGAIN)
-
-
-def _attempt(charge: Charge, open_port: Callable[[], ByteLine], clock: Clock) -> Final:
-    try:
-        line = open_port()
-    except PortError:
-        return Final("unknown", charge.bounds.names)
+def take_over(charge: Charge, state: EndState, open_port: Callable[[], ByteLine], clock: Clock) -> Final:
+    """Bring the servos into a state, on a port opened anew."""
     place = charge.place
-    bus = Bus(line, place.protocol, place.baud, clock, retries=1, patience=charge.patience)
-    try:
-        return leave(Gate(bus, charge.bounds), bus, charge.state)
-    finally:
-        with suppress(Exception):  # a port that is gone may fail to close, with any error
-            bus.close()
+
+    def opened() -> Bus:
+        return Bus(open_port(), place.protocol, place.baud, clock, retries=0, patience=charge.patience)
+
+    return leave_anew(charge.bounds, opened, clock, state)
 
 
 def report(need: Need, final: Final) -> dict[str, Any]:
@@ -118,11 +103,11 @@ def main() -> int:
         except queue.Empty:
             return None
 
-    need = watch_over(charge, hear, _end)
+    need, state = watch_over(charge, hear, _end)
     if need == "none":
         return 0
     place = charge.place
-    final = take_over(charge, lambda: open_line(place.port, place.baud, place.rs485), MonotonicClock())
+    final = take_over(charge, state, lambda: open_line(place.port, place.baud, place.rs485), MonotonicClock())
     facts = report(need, final)
     if need == "asked":
         _say(json.dumps(facts).encode())

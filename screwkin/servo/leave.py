@@ -1,21 +1,28 @@
-"""How servos are left: holding where they are, or limp; confirmed by reading back, servo by servo."""
+"""How servos are left: holding where they are, or limp; confirmed by reading back, servo by servo.
+
+A servo that does not confirm its state is commanded and asked again, for some seconds: a fault may pass.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, field
 from typing import Literal
 
 from screwkin.servo.bus import Bus
-from screwkin.servo.gate import Gate
-from screwkin.servo.line import BusError, LineLostError
+from screwkin.servo.gate import Bounds, Gate
+from screwkin.servo.line import BusError, Clock, LineLostError
 from screwkin.servo.profiles import decode
 
 EndState = Literal["hold", "limp"]
 """How servos can be left: stiff where they are, or without torque."""
 
-_TRIES = 3
-_SILENCE = 6  # answers missing in a row, each asked for more than once
+LASTS = 5.0
+"""Time [s] for which servos are commanded again that have not confirmed their state; hubs start in less."""
+_AGAIN = 0.02  # s from one round to the next
+_TIMES = 3  # that a command goes out which nobody answers
+_INSISTS = 3  # interrupts, after which a user wants the program to end at once
 
 
 @dataclass(frozen=True)
@@ -38,7 +45,7 @@ class Final:
         return f"All {count} servos {does}."
 
 
-def leave(gate: Gate, bus: Bus, state: EndState, as_is: bool = False) -> Final:
+def leave(gate: Gate, bus: Bus, state: EndState, as_is: bool = False, lasts: float = LASTS) -> Final:
     """Bring all servos into a state, and confirm it. A second interrupt does not stop it.
 
     Args:
@@ -46,81 +53,108 @@ def leave(gate: Gate, bus: Bus, state: EndState, as_is: bool = False) -> Final:
         bus: that the gate writes to.
         state: "hold": goals at the measured positions, torque on; "limp": torque off.
         as_is: hold the goals they have, as after a play that went well.
+        lasts: for how long servos that do not confirm it are commanded again [s].
+
+    Returns:
+        The state, with those that have not confirmed it; unknown where the line is lost or nobody answers.
     """
-    act: Callable[[], tuple[str, ...]] = (
-        (lambda: _limp(gate, bus)) if state == "limp" else (lambda: _hold(gate, bus, as_is))
-    )
-    for _ in range(_TRIES):
+    rounds = _Rounds(gate, bus, as_is, left=list(range(len(gate.bounds.ids))))
+    act = rounds.limp if state == "limp" else rounds.hold
+    unknown, until, interrupts = Final("unknown", gate.bounds.names), bus.clock.now() + lasts, 0
+    while True:
         try:
-            return Final(state, act())
+            act()
         except KeyboardInterrupt:
+            interrupts += 1
+            if interrupts == _INSISTS:
+                return unknown
             continue
         except LineLostError:
-            break
-    return Final("unknown", gate.bounds.names)
+            return unknown
+        if not rounds.heard:
+            return unknown
+        if not rounds.left or bus.clock.now() >= until:
+            return Final(state, tuple(gate.bounds.names[k] for k in rounds.left))
+        bus.clock.sleep(_AGAIN)
 
 
-def _limp(gate: Gate, bus: Bus) -> tuple[str, ...]:
-    left = list(range(len(gate.bounds.ids)))
-    for _ in range(_TRIES):
-        gate.torque(False)  # nobody answers to it: repeated before anything is waited for
-    read = _Reader(gate, bus)
-    for _ in range(_TRIES):
-        left = [k for k in left if read(k, "torque_enable") != 0]
-        if not left:
-            break
-        gate.torque(False, left)
-    return tuple(gate.bounds.names[k] for k in left)
+def leave_anew(bounds: Bounds, opened: Callable[[], Bus], clock: Clock, state: EndState) -> Final:
+    """Bring servos into a state over a line that was lost, or silent: opened anew as often as it takes.
+
+    Args:
+        bounds: of the servos.
+        opened: a bus with them, opened anew; raises OSError where there is none.
+        clock: what the time of trying goes by.
+        state: as for ``leave``.
+    """
+    until = clock.now() + LASTS
+    while True:
+        final = _over(bounds, opened, state, until)
+        if final.state != "unknown" or clock.now() >= until:
+            return final
+        clock.sleep(_AGAIN)
 
 
-def _hold(gate: Gate, bus: Bus, as_is: bool) -> tuple[str, ...]:
-    goals: dict[int, int] = {}
-    read = _Reader(gate, bus)
-    left = list(range(len(gate.bounds.ids)))
-    for _ in range(_TRIES):
-        for k in left:
-            if k not in goals:
-                at = read(k, "goal_position" if as_is else "present_position")
+def _over(bounds: Bounds, opened: Callable[[], Bus], state: EndState, until: float) -> Final:
+    try:
+        bus = opened()
+    except OSError:
+        return Final("unknown", bounds.names)
+    try:
+        return leave(Gate(bus, bounds), bus, state, lasts=until - bus.clock.now())
+    finally:
+        with suppress(Exception):  # a port that is gone may fail to close, with any error
+            bus.close()
+
+
+@dataclass(eq=False)
+class _Rounds:
+    """Servos are commanded into a state and asked for it, in rounds over those that have not confirmed it.
+
+    left: joints of these; goals: where they are to hold [ticks]; heard: whether anybody has ever answered.
+    """
+
+    gate: Gate
+    bus: Bus
+    as_is: bool
+    left: list[int]
+    goals: dict[int, int] = field(default_factory=dict)
+    heard: bool = False
+
+    def limp(self) -> None:
+        """Torque off."""
+        for _ in range(_TIMES):
+            self.gate.torque(False, self.left)  # before anything is waited for
+        self.left = [k for k in self.left if self._read(k, "torque_enable") != 0]
+
+    def hold(self) -> None:
+        """Goals where they stand or stood, torque on."""
+        for k in self.left:
+            if k not in self.goals:
+                at = self._read(k, "goal_position" if self.as_is else "present_position")
                 if at is not None:
-                    goals |= {k: at}
-        ready = {k: goals[k] for k in left if k in goals}
-        if ready:
-            goals |= gate.stay(ready)
-            gate.torque(True, sorted(ready))
-        left = [
-            k
-            for k in left
-            if k not in goals
-            or read(k, "goal_position") != goals[k]
-            or read(k, "torque_enable") != 1
-            or not read(k, "torque_limit")  # 0 once a servo of protocol 1.0 has shut itself down
-        ]
-        if not left:
-            break
-    return tuple(gate.bounds.names[k] for k in left)
+                    self.goals[k] = at
+        if ready := {k: self.goals[k] for k in self.left if k in self.goals}:
+            self.goals |= self.gate.stay(ready)
+            self.gate.torque(True, sorted(ready))
+        self.left = [k for k in self.left if not self._holds(k)]
 
+    def _holds(self, k: int) -> bool:
+        return (
+            k in self.goals
+            and self._read(k, "goal_position") == self.goals[k]
+            and self._read(k, "torque_enable") == 1
+            and bool(self._read(k, "torque_limit"))  # 0 once a servo of protocol 1.0 has shut itself down
+        )
 
-class _Reader:
-    """Reads registers; where servo after servo does not answer, the line is taken for lost."""
-
-    def __init__(self, gate: Gate, bus: Bus) -> None:
-        self.gate, self.bus, self.silent = gate, bus, 0
-
-    def __call__(self, k: int, name: str) -> int | None:
-        """A register of the servo of joint k, or None without an answer.
-
-        Raises:
-            LineLostError: several in a row are missing.
-        """
+    def _read(self, k: int, name: str) -> int | None:
+        """A register of the servo of joint k, or None without an answer."""
         register = self.gate.bounds.profiles[k].register(name)
         try:
             raw = self.bus.read(self.gate.bounds.ids[k], register.address, register.width).value
         except LineLostError:
             raise
-        except BusError as error:
-            self.silent += 1
-            if self.silent >= _SILENCE:
-                raise LineLostError("no servo answers any more: check the cable") from error
+        except BusError:
             return None
-        self.silent = 0
+        self.heard = True
         return decode(register, raw)

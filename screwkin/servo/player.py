@@ -161,10 +161,8 @@ class Player:
         except KeyboardInterrupt:
             fault = ServoFault("interrupted", "", -1, self._time(), "stopped by the user")
         finally:
-            self.bus.retries = 1
-            final = self._leave(state, finished)
+            final = self._known(leave(self.gate, self.bus, state, finished), state)
             self.bus.retries, self.bus.patience = retries, patience
-            final = self._known(final)
             self.log.flush(self._time())
         faults = (fault,) if fault else ()
         return PlayOutcome(self._frames, self._late, self.watch.max_tracking_error, faults, final, self.log)
@@ -203,25 +201,18 @@ class Player:
             raise SafetyError("the servos are not ready: " + "; ".join(reasons))
         return pose
 
-    def _leave(self, state: EndState, finished: bool) -> Final:
-        """Leave the servos in a state; where nobody answers, once more with the port opened anew."""
-        final = leave(self.gate, self.bus, state, finished)
-        if final.state == "unknown" and self.bus.reopen(self.settings.thresholds.reopen):
-            return leave(self.gate, self.bus, state, finished)
-        return final
-
     def _arm(self) -> None:
         """From now on somebody else leaves the servos as announced, should this process not do it."""
         silence = 1.0 / self.settings.rate + self.settings.thresholds.late + _SLACK
         self.guard.arm(self.bounds, self.settings.on_fault, self.bus.patience, silence)
 
-    def _known(self, final: Final) -> Final:
+    def _known(self, final: Final, state: EndState) -> Final:
         """The state the servos are in; where nobody answers, the guardian tries on a port opened anew."""
         if final.state != "unknown":
             self.guard.dismiss()
             return final
         self.bus.close()
-        return self.guard.take_over() or final
+        return self.guard.take_over(state) or final
 
     def _run(self, frames: Frames, pose: Array) -> None:
         start = self.bounds.within(pose)

@@ -67,8 +67,7 @@ class Thresholds:
     tracking [rad] from every goal of the last tracking_time [s]; temperature [degrees Celsius]; voltage as
     shares of the servo's nominal one; load [share of the greatest torque] for load_time [s]; lost: replies of
     one servo missing in a row; silence: replies missing in a row, of any; late [s]: of a frame; notice [s]:
-    within which a blocked joint must be noticed; no servo may go unread for longer; reopen [s]: for which a
-    lost port is tried again.
+    within which a blocked joint must be noticed; no servo may go unread for longer.
     """
 
     tracking: float = 0.25
@@ -82,7 +81,6 @@ class Thresholds:
     silence: int = 6
     late: float = 0.2
     notice: float = 0.5
-    reopen: float = 2.0
 
     @property
     def interval(self) -> float:

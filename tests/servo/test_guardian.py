@@ -88,9 +88,9 @@ class Watcher:
     def dismiss(self) -> None:
         self.said.append("dismiss")
 
-    def take_over(self):
-        self.said.append("take over")
-        return take_over(self.charge, self.opened, self.clock) if self.opened else None
+    def take_over(self, state):
+        self.said.append(f"take over: {state}")
+        return take_over(self.charge, state, self.opened, self.clock) if self.opened else None
 
     def close(self) -> None: ...
 
@@ -158,8 +158,8 @@ def dies(at: float, state: str, share: float, folder: Path) -> None:
         return
     assert play.guard.said == ["arm"]
     died = play.clock.now()
-    assert watch_over(play.guard.charge, lambda seconds: GONE, pytest.fail) == "died"
-    final = take_over(play.guard.charge, lambda: play.line, play.clock)
+    assert watch_over(play.guard.charge, lambda seconds: GONE, pytest.fail) == ("died", state)
+    final = take_over(play.guard.charge, state, lambda: play.line, play.clock)
     assert final == Final(state)
     assert play.clock.now() - died < 0.5
     play.check(state)
@@ -208,7 +208,7 @@ def test_a_port_that_vanishes_and_comes_back_is_opened_anew(state):
 
     play.guard.opened = opened
     outcome = play.run()
-    assert play.guard.said == ["arm", "take over"]
+    assert play.guard.said == ["arm", f"take over: {state}"]
     assert (outcome.faults[0].kind, outcome.final) == ("line", Final(state))
     assert play.clock.now() < there + 0.5
     assert not outcome.well
@@ -233,7 +233,9 @@ def test_servos_that_are_silent_at_first_are_asked_again():
     assert play.run() is None
     dumb = Mortal(play.line, 0.0, OSError(5, "gone"), 0.0)
     back = play.clock.now() + 1.0
-    final = take_over(play.guard.charge, lambda: dumb if play.clock.now() < back else play.line, play.clock)
+    final = take_over(
+        play.guard.charge, "limp", lambda: dumb if play.clock.now() < back else play.line, play.clock
+    )
     assert final == Final("limp")
     play.check("limp")
 
@@ -241,13 +243,14 @@ def test_servos_that_are_silent_at_first_are_asked_again():
 @pytest.mark.parametrize(
     ("said", "need", "ended"),
     [
-        ([DISMISSED], "none", []),
-        ([BEAT, BEAT, DISMISSED], "none", []),
-        ([BEAT, GONE], "died", []),
-        ([BEAT, TAKE_OVER], "asked", []),
-        ([None, GONE], "hung", [4711]),
-        ([BEAT, None, BEAT, BEAT, GONE], "hung", [4711]),
-        ([None, None], "hung", [4711]),
+        ([DISMISSED], ("none", "hold"), []),
+        ([BEAT, BEAT, DISMISSED], ("none", "hold"), []),
+        ([BEAT, GONE], ("died", "hold"), []),
+        ([BEAT, TAKE_OVER["hold"]], ("asked", "hold"), []),
+        ([TAKE_OVER["limp"]], ("asked", "limp"), []),
+        ([None, GONE], ("hung", "hold"), [4711]),
+        ([BEAT, None, BEAT, BEAT, GONE], ("hung", "hold"), [4711]),
+        ([None, None], ("hung", "hold"), [4711]),
     ],
 )
 def test_what_the_player_says_or_does_not_say_decides(said, need, ended):
@@ -303,7 +306,7 @@ def test_a_guardian_that_has_gone_is_noticed_and_the_play_comes_to_rest(tmp_path
     guard._last = -math.inf
     guard.beat()
     assert guard.lost
-    assert guard.take_over() is None
+    assert guard.take_over("hold") is None
     guard.close()
     play = Play(1e9, "limp")
     play.player._progress = lambda share: setattr(play.guard, "lost", share > 0.5)

@@ -18,6 +18,8 @@ from screwkin.servo import roundtrip
 from screwkin.servo.budget import Budget
 from screwkin.servo.bus import Bus
 from screwkin.servo.gate import Bounds
+from screwkin.servo.guarded import OwnGuard
+from screwkin.servo.leave import LASTS
 from screwkin.servo.player import Player, PlaySettings
 from screwkin.servo.roundtrip import RoundTrip, latency_advice, latency_timer
 from screwkin.servo.servo_map import ServoMap
@@ -54,8 +56,9 @@ class Rig:
         mounted = virtual_servos(robot, return_delay=500e-6)
         self.blocked_at = float(options.pop("blocked_at", np.inf))
         self.line = VirtualBus(mounted, self.clock, servos.baud, faults, witness=self._block, adapter=adapter)
-        bus = Bus(self.line, servos.protocol, servos.baud, self.clock, opener=self.line.reopened)
-        self.player = Player(bus, robot, PlaySettings(**options))
+        bus = Bus(self.line, servos.protocol, servos.baud, self.clock)
+        guard = OwnGuard(bus, self.line.reopened)
+        self.player = Player(bus, robot, PlaySettings(**options), guard=guard)
         self.off_since = np.nan
 
     def _block(self, time: float, id: int, command: object) -> None:
@@ -97,6 +100,23 @@ def test_a_slow_adapter_is_refused_beforehand_and_latency_timer_is_named(adapter
     assert "echo 1 | sudo tee /sys/bus/usb-serial/devices/ttyUSB0/latency_timer" in str(refusal.value)
     assert f"{1e3 * adapter:.0f}." in str(refusal.value), "the time that was measured"
     assert rig.torque() == {0}
+
+
+def test_a_computer_that_stands_still_as_answers_are_measured_is_no_slow_adapter():
+    rig = Rig(0.001)
+    readings, wrote, write = rig.player.readings, [], rig.line.write
+
+    def stalls(data: bytes) -> int:
+        wrote.append(rig.clock.now())
+        sent = write(data)
+        rig.clock.sleep(0.1 if len(wrote) == 20 else 0.0)
+        return sent
+
+    rig.line.write = stalls
+    readings.plan(50.0, Thresholds().interval)
+    assert readings.budget.interval(50.0) <= Thresholds().interval
+    assert rig.player.bus.patience == pytest.approx(0.008)
+    assert len(wrote) == 2 * roundtrip.SAMPLES
 
 
 @pytest.mark.parametrize(
@@ -155,7 +175,7 @@ def test_a_port_lost_for_good_is_given_up():
     rig = Rig(0.001, InjectedFault("pulled", 2.0))
     outcome = rig.player.play(steps())
     assert outcome.final.state == "unknown"
-    assert rig.clock.now() < 2.0 + Thresholds.reopen + 0.5
+    assert rig.clock.now() < 2.0 + LASTS + 0.5
 
 
 def test_a_servo_that_is_not_read_for_too_long_stops_the_play():
