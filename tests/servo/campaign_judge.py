@@ -19,6 +19,10 @@ TORQUE_ENABLE, GOAL, SPEED, TORQUE_LIMIT = 24, 30, 32, 34
 WIDTHS = {TORQUE_ENABLE: 1, GOAL: 2, SPEED: 2, TORQUE_LIMIT: 2}
 FRAME = 0.02  # s
 NEAR, NOTICE = 0.25 + TICK, 0.5 + 0.1 + FRAME  # rad and s: of the watchdog, and of goals of the last 0.1 s
+DEAD = -9
+"""Exit code of a player that was killed."""
+UNHEARD = ("pulled", "deaf", "mangled", "brown-out", "reset")
+"""Kinds after which a command may not reach a servo."""
 BYTES = 0.002  # s, longer than any packet takes
 
 
@@ -51,7 +55,11 @@ def told_wrongly(ended: Ended, table: dict[str, Any]) -> Iterator[str]:
     plan, ids = ended.plan, table["servos"]["ids"]
     faults = ended.data.get("faults", [])
     unsure = ended.data.get("unconfirmed", []) or ended.data.get("state") == "unknown"
-    good = 130 if plan.kind == "interrupted" and faults and not unsure else 4
+    if ended.code == DEAD:
+        return
+    good = (
+        130 if plan.kind == "interrupted" and not unsure and (faults or ended.message == "interrupted") else 4
+    )
     if ended.code != (good if faults or unsure or ended.outcome == "refused" else 0):
         yield f"exit code {ended.code} with {ended.outcome}"
     if ended.outcome == "refused":
@@ -76,7 +84,7 @@ def told_wrongly(ended: Ended, table: dict[str, Any]) -> Iterator[str]:
         yield f"{joint} is not servo {id}"
     if id is not None and plan.id not in (None, int(id)):
         yield f"servo {id} is blamed for what servo {plan.id} suffers: {ended.message}"
-    if id is None and kind not in ("line", "late", "interrupted"):
+    if id is None and kind not in ("line", "late", "interrupted", "guardian"):
         yield f"nobody is blamed: {ended.message}"
     if ended.time < plan.at - BYTES:  # a packet suffers from what happens until its last byte
         yield "it stopped before anything had happened"
@@ -85,6 +93,8 @@ def told_wrongly(ended: Ended, table: dict[str, Any]) -> Iterator[str]:
 def refused_wrongly(ended: Ended) -> Iterator[str]:
     """A refusal that names nobody, or another; or that comes though nothing has happened."""
     plan, message = ended.plan, ended.message
+    if ended.code == 130:  # before anything had moved
+        return
     if "latency_timer" in message and plan.adapter > 0.004:
         return
     named = r"error: .*\w+( \(servo \d+\)|: servo \d+ (does not answer|answers with damage))"
@@ -128,9 +138,10 @@ def unnoticed(line: Any, ended: Ended, table: dict[str, Any]) -> Iterator[str]:
             yield f"servo {servo.id} was blocked and unnoticed for {beyond[-1] - beyond[0]:.2f} s"
 
 
-def began(line: Any) -> float:
+def began(line: Any, otherwise: float = math.nan) -> float:
     """When torque came on [s]."""
-    return next(time for time, _, address, data in line.told if address == TORQUE_ENABLE and data[0] == 1)
+    on = (time for time, _, address, data in line.told if address == TORQUE_ENABLE and data[0] == 1)
+    return next(on, otherwise)
 
 
 def left_otherwise(line: Any, ended: Ended, table: dict[str, Any]) -> Iterator[str]:
@@ -142,7 +153,7 @@ def left_otherwise(line: Any, ended: Ended, table: dict[str, Any]) -> Iterator[s
     unsure = {ids[name] for name in ended.data["unconfirmed"]}
     if bool(unsure) != ("Switch their power off" in ended.data["message"]):
         yield f"what to do is not told: {ended.data['message']}"
-    if state == "unknown" and asked == "limp" and plan.kind not in ("pulled", "deaf", "brown-out", "reset"):
+    if state == "unknown" and asked == "limp" and plan.kind not in UNHEARD:
         unsure = set()  # they hear, though they do not answer
     for servo in line.servos:
         if servo.id not in unsure and servo.torque_on != (asked == "hold") and not servo.alarms:

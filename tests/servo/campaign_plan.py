@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import signal
 from dataclasses import dataclass, field
@@ -11,13 +12,13 @@ import numpy as np
 
 from screwkin.servo.virtual.faults import KINDS, InjectedFault
 
-OTHERS = ("stalled", "suspended", "clock", "interrupted")
+OTHERS = ("stalled", "suspended", "clock", "interrupted", "killed", "unguarded")
 """Faults of the computer, not of the bus: it stands still for a moment, or for long; its wall clock jumps; a
-signal asks the play to end."""
+signal asks the play to end; the player dies, in the middle of a packet; its guardian does."""
 BEFORE = ("misconfigured", "twin")
 """Faults that are there from the start: a register holds something else; two servos have one id."""
 ALL_KINDS = (*KINDS, *OTHERS, *BEFORE)
-HARMLESS = ("noise", "stalled", "suspended", "clock", "interrupted", "blocked")
+HARMLESS = ("noise", "blocked", *OTHERS)
 """Kinds after which every servo hears and answers: whoever is called dead is alive."""
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 REGISTERS = (
@@ -82,6 +83,9 @@ class Plan:
         return [InjectedFault(self.kind, self.at, self.until, self.id, self.share, self.volts)]
 
 
+_SEEN = ("code", "data", "message", "time", "problems")
+
+
 @dataclass
 class Ended:
     """How a run ended, and what was wrong with that: ``problems`` must be empty."""
@@ -92,6 +96,16 @@ class Ended:
     message: str = ""
     time: float = math.nan
     problems: list[str] = field(default_factory=list)
+
+    def row(self) -> str:
+        """As a line of JSON; what the plan is follows from its seed."""
+        return json.dumps({"seed": self.plan.seed, **{name: getattr(self, name) for name in _SEEN}})
+
+    @classmethod
+    def of(cls, row: str, lasts: float) -> Ended:
+        """The run of such a line."""
+        seen = json.loads(row)
+        return cls(Plan.of(seen.pop("seed"), lasts), **seen)
 
     @property
     def outcome(self) -> str:

@@ -45,6 +45,6 @@ def test_a_goal_beyond_the_limits_would_be_noticed(walk, monkeypatch):
 
 @pytest.mark.slow
 def test_a_thousand_runs_end_as_they_must(tmp_path):
-    runs = campaign(range(1000), tmp_path, prepare(tmp_path), jobs=2)
+    runs = list(campaign(range(1000), tmp_path, prepare(tmp_path), jobs=2))
     assert len(runs) == 1000
     assert [(run.plan, run.problems) for run in runs if run.problems] == []
