@@ -52,7 +52,7 @@ def leave(gate: Gate, bus: Bus, state: EndState, as_is: bool = False, lasts: flo
         gate: to the servos.
         bus: that the gate writes to.
         state: "hold": goals at the measured positions, torque on; "limp": torque off.
-        as_is: hold the goals they have, as after a play that went well.
+        as_is: hold the goals they have, as after a motion that came to rest.
         lasts: for how long servos that do not confirm it are commanded again [s].
 
     Returns:

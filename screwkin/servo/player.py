@@ -122,7 +122,7 @@ class Player:
         self._frames = self._late = 0
         self._began = bus.clock.now()
         self._due = 0.0
-        self._resting = False
+        self._resting = self._rests = False
 
     def play(self, trajectory: Trajectory) -> PlayOutcome:
         """Play the trajectory, and leave the servos as the settings say.
@@ -146,12 +146,12 @@ class Player:
             raise KeyboardInterrupt
         fault: ServoFault | None = None
         final = Final("unknown", self.bounds.names)
-        state, finished = self.settings.on_fault, False
+        state = self.settings.on_fault
         self.bus.retries = 0  # in a play nobody waits: a lost reply is asked for again in the next frame
         self._arm()
         try:
             self._run(frames, pose)
-            state, finished = self.settings.at_end, True
+            state, self._rests = self.settings.at_end, True
         except PlayStopped as stopped:
             fault = stopped.fault
         except LineLostError as error:
@@ -161,7 +161,7 @@ class Player:
         except KeyboardInterrupt:
             fault = ServoFault("interrupted", "", -1, self._time(), "stopped by the user")
         finally:
-            final = self._known(leave(self.gate, self.bus, state, finished), state)
+            final = self._known(leave(self.gate, self.bus, state, self._rests), state)
             self.bus.retries, self.bus.patience = retries, patience
             self.log.flush(self._time())
         faults = (fault,) if fault else ()
@@ -266,7 +266,13 @@ class Player:
     def _come_to_rest(self, q: Array, i: int, kind: FaultKind, why: str) -> None:
         """Run on ever more slowly for a moment, then stop."""
         self._resting = True
-        self._stream(run_out(q, i, self.settings.stop, self.settings.rate), None)
+        try:
+            self._stream(run_out(q, i, self.settings.stop, self.settings.rate), None)
+            self._rests = True
+        except PlayStopped as stopped:
+            if stopped.fault.kind != "late":
+                raise
+            why += f"; not run out: {stopped.fault.message}"  # of that alone nobody would have stopped
         raise PlayStopped(ServoFault(kind, "", -1, self._time(), why))
 
     def _read(self, goal: Array) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from functools import cache
 
@@ -229,6 +230,45 @@ def test_a_wish_to_stop_runs_out_on_the_path_within_four_tenths_of_a_second(stat
         share = at - low
         np.testing.assert_allclose(row, (1 - share) * planned[low] + share * planned[low + 1], atol=1e-9)
     assert rig.clock.now() - when < 0.4 + 0.25, "run out, confirmed, done"
+
+
+@pytest.mark.parametrize(("state", "stall"), [("limp", 0.3), ("hold", 0.25)])
+def test_who_wished_to_stop_is_answered_so_even_where_the_computer_stands_still_meanwhile(state, stall):
+    rig = Rig(on_fault=state)
+    asked = []
+
+    def stop() -> bool:
+        if rig.clock.now() > WITHIN:
+            asked.append(rig.player._frames)
+        return bool(asked)
+
+    rig.player._stop = stop
+    frame = rig.player.gate.goals
+
+    def slow(*words):
+        if asked and rig.player._frames == asked[0] + 5:
+            rig.clock.sleep(stall)
+        return frame(*words)
+
+    rig.player.gate.goals = slow
+    outcome = rig.play()
+    [fault] = outcome.faults
+    assert fault.kind == "interrupted"
+    assert re.fullmatch(
+        r"stopped by the user; not run out: a frame was sent 0\.\d+ s late, .*", fault.message
+    )
+    assert (outcome.final.state, outcome.final.unconfirmed) == (state, ())
+    assert rig.player._frames < asked[0] + 20, "and no goal is sent any more"
+
+
+def test_a_motion_that_has_run_out_holds_its_last_goals():
+    """They are where it rests on its path; measured positions would give way to the load."""
+    rig = Rig(on_fault="hold")
+    rig.player._stop = lambda: rig.clock.now() > WITHIN
+    rig.play()
+    last = rig.player.log.arrays({})["command"][-1]
+    goals = [rig.line.servo(id).get("goal_position") for id in rig.player.bounds.ids]
+    assert goals == list(rig.player.bounds.ticks(last))
 
 
 def test_a_wish_to_stop_at_the_last_frames_goes_no_farther_than_the_path():
