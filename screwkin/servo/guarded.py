@@ -142,14 +142,14 @@ def no_guardian() -> str:
 
 
 class Guardian:
-    """A guardian that has been started; ``lost`` once it is gone.
+    """A guardian that runs; ``lost`` once it is gone.
 
     Args:
         place: of the servos.
         journal: of the play.
 
     Raises:
-        SafetyError: it cannot be started.
+        SafetyError: it does not start.
     """
 
     def __init__(self, place: Place, journal: Path) -> None:
@@ -173,6 +173,9 @@ class Guardian:
         except OSError as error:
             raise SafetyError(f"no guardian can be started ({error}); nothing was moved") from None
         threading.Thread(target=self._listen, daemon=True).start()
+        if self._hear(_STARTS) != READY:  # now, as its start would disturb the times that answers take
+            self._process.kill()
+            raise self._missing()
 
     def arm(self, bounds: Bounds, state: EndState, patience: float, silence: float) -> None:
         """Say what is to be done, to a guardian that runs.
@@ -180,18 +183,18 @@ class Guardian:
         Raises:
             SafetyError: it does not.
         """
-        charge = Charge(self.place, bounds, state, patience, silence, os.getpid(), self.journal)
-        runs = self._hear(_STARTS) == READY
-        if runs:
-            self._say(_packed(charge))
-        if not runs or self.lost or self._hear(_STARTS) != READY:
-            self.lost = True
-            raise SafetyError(
-                "the guardian does not start: nobody would leave the servos, should this program die"
-            )
+        self._say(_packed(Charge(self.place, bounds, state, patience, silence, os.getpid(), self.journal)))
+        if self.lost or self._hear(_STARTS) != READY:
+            raise self._missing()
         self._last = -math.inf
         if os.name == "posix" and self._process.stdin is not None:
             os.set_blocking(self._process.stdin.fileno(), False)  # nobody waits for one that is stopped
+
+    def _missing(self) -> SafetyError:
+        self.lost = True
+        return SafetyError(
+            "the guardian does not start: nobody would leave the servos, should this program die"
+        )
 
     def beat(self) -> None:
         """Say that the player lives, not more often than need be."""

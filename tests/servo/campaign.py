@@ -158,8 +158,9 @@ def mounted(plan: Plan, servos: Sequence[VirtualServo]) -> list[VirtualServo]:
     return list(servos)
 
 
-def prepare(folder: Path, simulated: bool = True) -> float:
+def prepare(folder: Path, simulated: bool = True, model: str = "AX-12A") -> float:
     """Make the walk of the campaign in a folder, validated or said to be; how long its play lasts [s]."""
+    folder.mkdir(exist_ok=True)
     robot = load_robot("bioloid")
     q = np.vstack([walk(robot, load_gait("smooth"), 1).q, robot.posture("home").q])
     margin = math.radians(2)
@@ -169,11 +170,12 @@ def prepare(folder: Path, simulated: bool = True) -> float:
         for joint, low, high in zip(robot.joints, q.min(axis=0), q.max(axis=0), strict=True)
     )
     zero = {joint.name: round(float(rng.uniform(-0.1, 0.1)), 4) for joint in joints}
+    servos = {key: value for key, value in robot.servos.items() if key != "protocol"} | {"zero": zero}
     tight = replace(
         robot,
         joints=joints,
         postures=tuple(posture for posture in robot.postures if posture.name == "home"),
-        servos={**robot.servos, "zero": zero},
+        servos=servos | ({} if model == "AX-12A" else {"model": model}),
     )
     table = folder / "tight.toml"
     table.write_text(robot_toml(tight), encoding="utf-8")
@@ -305,6 +307,12 @@ def summary(runs: Sequence[Ended]) -> str:
     return "\n".join("| " + " | ".join(map(str, row)) + " |" for row in rows)
 
 
+def written_between(text: str, marks: tuple[str, str], table: str) -> str:
+    """A page with a table written between two marks of it."""
+    before, _, rest = text.partition(marks[0])
+    return f"{before}{marks[0]}\n\n{table}\n\n{marks[1]}{rest.partition(marks[1])[2]}"
+
+
 def main(words: Sequence[str] | None = None) -> int:
     """Run the campaign from the command line; 1 if anything was not as it must be."""
     options = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
@@ -327,10 +335,7 @@ def main(words: Sequence[str] | None = None) -> int:
         print(f"seed {run.plan.seed} ({run.plan.kind}): {'; '.join(run.problems[:3])}")
     print(f"{len(runs)} runs, {len(bad)} not as they must be")
     if chosen.docs and not bad:
-        text = DOCS.read_text(encoding="utf-8")
-        before, _, rest = text.partition(MARKS[0])
-        after = rest.partition(MARKS[1])[2]
-        DOCS.write_text(f"{before}{MARKS[0]}\n\n{table}\n\n{MARKS[1]}{after}", encoding="utf-8")
+        DOCS.write_text(written_between(DOCS.read_text(encoding="utf-8"), MARKS, table), encoding="utf-8")
     return 1 if bad else 0
 
 

@@ -7,6 +7,7 @@ import json
 import math
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,38 @@ import numpy as np
 
 from tests.servo.campaign_plan import HARMLESS, Ended, Plan
 
-TICK, CENTRE, SPEED_UNIT = math.radians(300 / 1024), 512, 0.111 * 2 * math.pi / 60
-TORQUE_ENABLE, GOAL, SPEED, TORQUE_LIMIT = 24, 30, 32, 34
-WIDTHS = {TORQUE_ENABLE: 1, GOAL: 2, SPEED: 2, TORQUE_LIMIT: 2}
+
+@dataclass(frozen=True)
+class Manual:
+    """What the manual of a servo says: registers by address and bytes; units; the greatest torque limit."""
+
+    tick: float
+    centre: int
+    speed_unit: float
+    torque_enable: int
+    goal: int
+    speed: int
+    torque_limit: int
+    widths: tuple[int, int, int, int]
+    full: int
+
+    @property
+    def registers(self) -> dict[int, int]:
+        """Bytes of the registers that matter, by address."""
+        return dict(
+            zip((self.torque_enable, self.goal, self.speed, self.torque_limit), self.widths, strict=True)
+        )
+
+
+AX_12A = Manual(math.radians(300 / 1024), 512, 0.111 * 2 * math.pi / 60, 24, 30, 32, 34, (1, 2, 2, 2), 1023)
+MX_28_2 = Manual(
+    math.radians(360 / 4096), 2048, 0.229 * 2 * math.pi / 60, 64, 116, 112, 100, (1, 4, 4, 2), 885
+)
 FRAME = 0.02  # s
-NEAR, NOTICE = 0.25 + TICK, 0.5 + 0.1 + FRAME  # rad and s: of the watchdog, and of goals of the last 0.1 s
+NEAR, NOTICE = (
+    0.25 + AX_12A.tick,
+    0.5 + 0.1 + FRAME,
+)  # rad and s: of the watchdog, and of goals of the last 0.1 s
 DEAD = -9
 """Exit code of a player that was killed."""
 UNHEARD = ("pulled", "deaf", "mangled", "brown-out", "reset")
@@ -26,24 +54,24 @@ UNHEARD = ("pulled", "deaf", "mangled", "brown-out", "reset")
 BYTES = 0.002  # s, longer than any packet takes
 
 
-def written_beyond(line: Any, table: dict[str, Any], plan: Plan) -> Iterator[str]:
+def written_beyond(line: Any, table: dict[str, Any], plan: Plan, manual: Manual = AX_12A) -> Iterator[str]:
     """Goals, speeds and torque limits that reached a servo and are beyond its joint's limits."""
     servos = table["servos"]
     joints = {servos["ids"][joint["name"]]: joint for joint in table["joint"]}
     for time, id, address, data in line.told:
         joint = joints[id]
-        for register, width in WIDTHS.items():
+        for register, width in manual.registers.items():
             if not address <= register <= address + len(data) - width:
                 continue
             value = int.from_bytes(data[register - address :][:width], "little")
-            if register == GOAL:
+            if register == manual.goal:
                 turn = servos["direction"].get(joint["name"], 1)
-                q = turn * ((value - CENTRE) * TICK - servos["zero"][joint["name"]])
+                q = turn * ((value - manual.centre) * manual.tick - servos["zero"][joint["name"]])
                 good = joint["lower"] - 1e-9 <= q <= joint["upper"] + 1e-9
-            elif register == SPEED:
-                good = 0 < value * SPEED_UNIT <= joint["velocity"]
-            elif register == TORQUE_LIMIT:
-                good = value <= 1023 * plan.torque
+            elif register == manual.speed:
+                good = 0 < value * manual.speed_unit <= joint["velocity"]
+            elif register == manual.torque_limit:
+                good = value <= manual.full * plan.torque
             else:
                 good = value in (0, 1)
             if not good:
@@ -119,18 +147,20 @@ def called_dead(ended: Ended, table: dict[str, Any]) -> Iterator[str]:
         yield f"servos {sorted(unsure)} are called dead, and servo {plan.id} alone suffers"
 
 
-def unnoticed(line: Any, ended: Ended, table: dict[str, Any]) -> Iterator[str]:
+def unnoticed(line: Any, ended: Ended, table: dict[str, Any], manual: Manual = AX_12A) -> Iterator[str]:
     """A blocked joint that was farther than the watchdog's 0.25 rad from its goals for longer than 0.5 s."""
     if ended.plan.kind != "blocked" or ended.outcome == "refused":
         return
-    stopped = ended.data["faults"][0]["time"] + began(line) if ended.data["faults"] else ended.time
+    stopped = (
+        ended.data["faults"][0]["time"] + began(line, manual=manual) if ended.data["faults"] else ended.time
+    )
     for servo in line.servos:
         if ended.plan.id not in (None, servo.id):
             continue
         away = [
-            (time, abs((int.from_bytes(data[:2], "little") - CENTRE) * TICK - servo.body.angle))
+            (time, abs((int.from_bytes(data[:2], "little") - manual.centre) * manual.tick - servo.body.angle))
             for time, id, address, data in line.told
-            if id == servo.id and address == GOAL and ended.plan.at <= time <= stopped
+            if id == servo.id and address == manual.goal and ended.plan.at <= time <= stopped
         ]
         since = next((time for time, far in reversed(away) if far <= NEAR), ended.plan.at)
         beyond = [time for time, far in away if time > since and far > NEAR]
@@ -138,9 +168,9 @@ def unnoticed(line: Any, ended: Ended, table: dict[str, Any]) -> Iterator[str]:
             yield f"servo {servo.id} was blocked and unnoticed for {beyond[-1] - beyond[0]:.2f} s"
 
 
-def began(line: Any, otherwise: float = math.nan) -> float:
+def began(line: Any, otherwise: float = math.nan, manual: Manual = AX_12A) -> float:
     """When torque came on [s]."""
-    on = (time for time, _, address, data in line.told if address == TORQUE_ENABLE and data[0] == 1)
+    on = (time for time, _, address, data in line.told if address == manual.torque_enable and data[0] == 1)
     return next(on, otherwise)
 
 

@@ -321,7 +321,15 @@ def test_no_play_begins_without_its_guardian(tmp_path, monkeypatch):
     with pytest.raises(SafetyError, match="no guardian can be started"):
         started(tmp_path)
     monkeypatch.setattr("sys.executable", "/bin/true")
+    with pytest.raises(SafetyError, match="the guardian does not start"):
+        started(tmp_path)
+
+
+def test_no_play_begins_once_its_guardian_has_gone(tmp_path):
     guard = started(tmp_path)
+    guard._process.kill()
+    guard._process.wait(10)
     with pytest.raises(SafetyError, match="the guardian does not start"):
         guard.arm(Play(1e9, "hold").player.bounds, "hold", 0.01, 60.0)
+    assert guard.lost
     guard.close()
