@@ -7,9 +7,14 @@ the whole robot does. Generalised forces (B - A) a + c make up for the differenc
 the rotors', c the inertial force of the balls as their rates' Jacobians change, and a the acceleration that
 the step shall have.
 
-That is found from the step before: what acted then, the mass matrix times its acceleration, acts again, but
-for the motors' torques, which are known. Contact forces answer to the correction within the step and are only
-known after it; a part of the correction per step settles where a whole one would swing.
+That is the acceleration of the step before, and the forces are improved from step to step until they answer
+to it. One improvement is enough where its own effect on the acceleration is known: without contacts the mass
+matrix says it. A contact lets the forces move the robot much less, and forces that do not know swing up
+within a few steps; so points on the floor count as heavy masses. Where one slides or leaves, the forces
+settle later.
+
+The stop of a point that strikes the floor is no acceleration to answer to: the floor stopped a leg that the
+balls made heavy, and forces that made it light again after the blow would throw it up.
 """
 
 from __future__ import annotations
@@ -23,8 +28,10 @@ from screwkin.algebra.arrays import Array
 from screwkin.errors import InputError
 from screwkin.model.robot import Robot
 
-SHARE = 0.3
-"""Part of the difference by which the forces follow in one step; from 0.2 to 0.5 walks are the same."""
+SHARE = 0.5
+"""Part of the improvement that is made in one step, as friction in the joints is not known to it."""
+FIXED = 100.0
+"""Mass of a point that touches the floor, in masses of the robot."""
 
 
 def with_rotors(robot: Robot, rotors: Array, steadied: bool) -> Robot:
@@ -75,6 +82,7 @@ class RelativeRotors:
         self._p, self._client, self._body, self._joints, self._rotors = p, client, body, joints, rotors
         infos = [p.getJointInfo(body, j, **client) for j in joints]
         dynamics = [p.getDynamicsInfo(body, link, **client) for link in (-1, *joints)]
+        self._mass = sum(d[0] for d in dynamics)
         self._root_mass = np.sqrt([d[0] for d in dynamics])
         self._root_balls = np.sqrt([rotors.max(), *rotors])
         self._root_inertia = np.sqrt([d[2] for d in dynamics])
@@ -89,6 +97,7 @@ class RelativeRotors:
     def reset(self) -> None:
         """Forget the step before."""
         self._velocity: Array | None = None
+        self._rows: Array = np.zeros((0, 0))
         self._force = np.zeros(self._first + len(self._joints))
         self._torque = np.zeros(len(self._joints))
 
@@ -97,17 +106,18 @@ class RelativeRotors:
         p = self._p
         links = p.getLinkStates(self._body, self._joints, 0, 0, **self._client)
         velocity = self._rates()
-        if self._velocity is None:
-            self._rows = self._inertias(links)[1]
-        else:
-            mass, rows = self._inertias(links)
-            balls, rotors = rows.T @ rows, np.diag(self._at_joints(self._rotors))
+        mass, rows, touching = self._inertias(links)
+        if self._velocity is not None:
+            fixed = FIXED * self._mass
+            inertia = mass + fixed * touching.T @ touching
+            surplus = rows.T @ rows - np.diag(self._at_joints(self._rotors))
             changing = rows.T @ ((rows - self._rows) @ velocity) / dt
-            self._rows = rows
-            acted = mass @ ((velocity - self._velocity) / dt) - self._force
-            acted += self._at_joints(torque - self._torque)
-            wanted = mass @ np.linalg.solve(mass - balls + rotors, acted + changing) - acted
-            self._force = self._force + SHARE * (wanted - self._force)
+            sinking = np.minimum(touching[2::3] @ self._velocity, 0.0)  # points that struck the floor
+            struck = fixed * touching[2::3].T @ sinking / dt
+            beside = np.linalg.solve(inertia, self._at_joints(torque - self._torque) + struck)
+            needed = surplus @ ((velocity - self._velocity) / dt + beside) + changing
+            settled = np.linalg.solve(inertia - surplus, needed - self._force)
+            self._force = self._force + SHARE * inertia @ settled
             p.setJointMotorControlArray(
                 self._body,
                 self._joints,
@@ -118,7 +128,7 @@ class RelativeRotors:
             if self._first:
                 moment = self._force[:3].tolist()
                 p.applyExternalTorque(self._body, -1, moment, p.WORLD_FRAME, **self._client)
-        self._velocity, self._torque = velocity, np.array(torque)
+        self._velocity, self._torque, self._rows = velocity, np.array(torque), rows
 
     def _rates(self) -> Array:
         """Angular and linear velocity of the base's CoM, then joint rates: (6 + n,)."""
@@ -130,8 +140,11 @@ class RelativeRotors:
         """Values (n,) of joints among those of all rates."""
         return np.append(np.zeros(self._first), values)
 
-    def _inertias(self, links: Any) -> tuple[Array, Array]:
-        """Mass matrix with the balls in it, and rows whose square is the balls'; no base if it is fixed."""
+    def _inertias(self, links: Any) -> tuple[Array, Array, Array]:
+        """Mass matrix with the balls, rows whose square is the balls', Jacobian of points on the floor.
+
+        Without the base's rates if it is fixed.
+        """
         n = len(links)
         base, turn = self._p.getBasePositionAndOrientation(self._body, **self._client)
         com = np.array([base, *(link[0] for link in links)])
@@ -150,7 +163,15 @@ class RelativeRotors:
         free = slice(6 - self._first, None)
         rows = np.concatenate([carried, turned]).reshape(-1, 6 + n)[:, free]
         balls = (self._root_balls[:, None, None] * angular).reshape(-1, 6 + n)[:, free]
-        return rows.T @ rows, balls
+        return rows.T @ rows, balls, self._touching(com, angular, linear)[:, free]
+
+    def _touching(self, com: Array, angular: Array, linear: Array) -> Array:
+        """Jacobian (3 K, 6 + n) of the points that the floor pressed in the step before."""
+        touches = [t for t in self._p.getContactPoints(self._body, **self._client) if t[9] > 0.0]
+        link = [(-1, *self._joints).index(touch[3]) for touch in touches]
+        arms = np.array([touch[5] for touch in touches]).reshape(-1, 3) - com[link]
+        turned = np.cross(angular[link], arms[:, :, None], axis=1)
+        return np.asarray((linear[link] + turned).reshape(-1, angular.shape[2]))
 
     def _rotations(self, quats_xyzw: Any) -> Array:
         """Rotation matrices (..., 3, 3)."""

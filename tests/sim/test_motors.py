@@ -108,3 +108,12 @@ def test_in_the_air_rotors_turn_a_robot_no_more_in_one_engine_than_in_the_other(
     assert turned > 0.1
     assert between < 0.02 * turned
     np.testing.assert_allclose(one.q, other.q, atol=5e-3)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_standing_foot_stays_where_it_is_when_the_other_strikes_the_floor(engine):
+    """The gait sets its foot down at 0.1 m/s; rotors that answer to the blow hammer both feet away."""
+    pytest.importorskip(engine)
+    robot = sk.load_robot("bioloid")
+    walk = sk.walk(robot, sk.load_gait("paper").replace(Tc=1.0, stride=0.2), steps=1)
+    assert sk.validate(robot, walk, engine, servo="table").slip_mm < 0.1
