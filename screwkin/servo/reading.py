@@ -117,7 +117,10 @@ class Readings:
         """
         grouped = grouping(self.bounds.profiles)
         if grouped != "none":
-            self._read_group(grouped, rate, taken, lost)
+            if (
+                self.bus.clock.now() + self.budget.read <= due
+            ):  # else it would make every later frame late too
+                self._read_group(grouped, rate, taken, lost)
             return
         again: list[int] = []
         for count in range(len(self._queue)):

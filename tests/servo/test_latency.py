@@ -130,6 +130,23 @@ def test_servos_that_are_read_together_play_behind_a_slow_adapter(adapter, model
     assert rig.gaps <= 0.25
 
 
+def test_answers_that_take_longer_than_was_measured_do_not_make_frame_after_frame_late():
+    """Behind 16 ms a frame of 20 ms has no time to spare: what one reading is too long the next leaves out."""
+    rig = Rig(0.015, model="MX-28-2")
+    plan = rig.player.readings.plan
+
+    def planned(rate: float, interval: float) -> None:
+        plan(rate, interval)
+        rig.line.adapter = 0.0175
+
+    rig.player.readings.plan = planned
+    outcome = rig.player.play(steps())
+    log = rig.player.log.arrays({})
+    assert (log["sent"] - log["time"]).max() < 0.008, "and not ever more"
+    assert outcome.faults == ()
+    assert rig.gaps <= Thresholds.notice
+
+
 def test_who_accepts_to_notice_later_plays_behind_an_adapter_as_it_is_sold():
     rig = Rig(0.016, thresholds=Thresholds(notice=0.8))
     outcome = rig.player.play(steps())
