@@ -106,6 +106,6 @@ def budget(
     longest = max(block_of(profile)[1] for profile in profiles)
     more = (facts.answer_size + longest) * byte + return_delay  # an answer that follows another
     read = facts.read_size * byte + more + adapter if answer is None else answer
-    grouped = grouping(profiles) != "none"
     write = (goals + packets * facts.sync_size) * byte
-    return Budget(write, read, min(more, read) if grouped else again or read, len(profiles))
+    further = again or (read if grouping(profiles) == "none" else min(more, read))
+    return Budget(write, read, further, len(profiles))

@@ -16,6 +16,9 @@ from screwkin.servo.roundtrip import RoundTrip, latency_advice, measured_round_t
 
 _MEASURED = 2  # times before a refusal: a computer that stands still for a moment is no slow adapter
 
+_GROUPS = 3  # readings of all servos in one packet by which a further answer is measured
+_LEAST = 1e-4  # s
+
 Taken = Callable[[int, Reply], None]
 """Called with joint and answer."""
 
@@ -71,7 +74,8 @@ class Readings:
         """
         for _ in range(_MEASURED):
             trip = self._round_trip()
-            carried = budget(self.bounds.profiles, self.bus.baud, answer=trip.median, again=trip.most)
+            again = self._further(trip)
+            carried = budget(self.bounds.profiles, self.bus.baud, answer=trip.median, again=again)
             if carried.interval(rate) <= interval + 1e-9:
                 self.bus.patience, self.budget = trip.patience, carried
                 return
@@ -96,6 +100,18 @@ class Readings:
             raise
         except BusError as error:
             raise SafetyError(f"the servos are not ready: {error}") from None
+
+    def _further(self, trip: RoundTrip) -> float:
+        """How long a further answer in a frame takes [s]; in one packet, with what the computer needs for it."""
+        grouped, ids = grouping(self.bounds.profiles), self.bounds.ids
+        if grouped == "none":
+            return trip.most
+        start, length, _ = self.blocks[0]
+        began = self.bus.clock.now()
+        for _ in range(_GROUPS):
+            self.bus.read_many(ids, start, length, grouped)
+        lasted = (self.bus.clock.now() - began) / _GROUPS
+        return min(max((lasted - trip.median) / (len(ids) - 1), _LEAST), trip.most)
 
     def torque_is_read(self) -> bool:
         """Whether the torque limit is among what is read of every servo."""

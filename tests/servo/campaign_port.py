@@ -218,8 +218,8 @@ def remarks(rows: Sequence[dict[str, Any]]) -> str:
     half, most, all_ = np.median(late[:, 0]), np.median(late[:, 1]), late[:, 2].max()
     frames = sum(row["late_frames"] or 0 for row in rows)
     return (
-        f"Of {len(mine)} healthy plays behind 0, 1, 8 and 16 ms, {ended} finished, {timers} of them once they "
-        f"had been refused and the `latency_timer` they named was set to 1 ms. Frames were sent "
+        f"Of {len(mine)} healthy plays behind 0, 1, 8 and 16 ms, {ended} finished, {timers} of them once "
+        f"they had been refused and the `latency_timer` they named was set to 1 ms. Frames were sent "
         f"{half:.2f} ms late in the median play's median, {most:.2f} ms in its 99 %, {all_:.0f} ms at most; "
         f"{frames} of them more than 2 ms late."
     )

@@ -131,7 +131,7 @@ def test_servos_that_are_read_together_play_behind_a_slow_adapter(adapter, model
 
 
 def test_answers_that_take_longer_than_was_measured_do_not_make_frame_after_frame_late():
-    """Behind 16 ms a frame of 20 ms has no time to spare: what one reading is too long the next leaves out."""
+    """Behind 16 ms a frame of 20 ms has no time to spare: one reading too long, and the next is left out."""
     rig = Rig(0.015, model="MX-28-2")
     plan = rig.player.readings.plan
 
