@@ -285,7 +285,7 @@ class Player:
         def lost(k: int) -> None:
             self.watch.lost(k, self._time())
 
-        self.readings.read(self._due, self.settings.rate, taken, lost)
+        self.readings.read(self._due, taken, lost)
 
     def _time(self) -> float:
         return self.bus.clock.now() - self._began

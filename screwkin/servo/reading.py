@@ -35,7 +35,7 @@ class Readings:
         self.bus, self.bounds = bus, bounds
         self.blocks = [block_of(profile) for profile in bounds.profiles]
         self.budget = budget(bounds.profiles, bus.baud)
-        self._queue = deque(range(len(bounds.ids)))
+        self._queue, self._more = deque(range(len(bounds.ids))), self.budget.more
 
     def ask(self, k: int) -> Reply:
         """The bytes of the servo of joint k that a play looks at.
@@ -70,14 +70,13 @@ class Readings:
             interval: longest time from one reading of a servo to the next [s].
 
         Raises:
-            SafetyError: servos would be read more rarely, or one has fallen silent. LineLostError.
+            SafetyError: servos would be read more rarely, one has fallen silent, or the port is gone.
         """
         for _ in range(_MEASURED):
-            trip = self._round_trip()
-            again = self._further(trip)
+            trip, again = self._answers_take()
             carried = budget(self.bounds.profiles, self.bus.baud, answer=trip.median, again=again)
             if carried.interval(rate) <= interval + 1e-9:
-                self.bus.patience, self.budget = trip.patience, carried
+                self.bus.patience, self.budget, self._more = trip.patience, carried, carried.more
                 return
             self.bus.statistics.recent.clear()
         reads, apart = carried.reads(rate), carried.interval(rate)
@@ -92,39 +91,35 @@ class Readings:
             + "; or ".join(advice)
         )
 
-    def _round_trip(self) -> RoundTrip:
+    def _answers_take(self) -> tuple[RoundTrip, float]:
+        """Times of single answers, and of a further one in a frame [s]."""
+        ids, grouped = self.bounds.ids, grouping(self.bounds.profiles)
         start, length, _ = self.blocks[0]
         try:
-            return measured_round_trips(self.bus, self.bounds.ids, start, length)
-        except LineLostError:
-            raise
+            trip = measured_round_trips(self.bus, ids, start, length)
+            if grouped == "none":
+                return trip, trip.most
+            began = self.bus.clock.now()
+            for _ in range(_GROUPS):
+                self.bus.read_many(ids, start, length, grouped)
+            lasted = (self.bus.clock.now() - began) / _GROUPS
+        except LineLostError as error:
+            raise SafetyError(f"the servos cannot be asked: {error}") from None
         except BusError as error:
             raise SafetyError(f"the servos are not ready: {error}") from None
-
-    def _further(self, trip: RoundTrip) -> float:
-        """How long a further answer in a frame takes [s]; in one packet, with what the computer needs for it."""
-        grouped, ids = grouping(self.bounds.profiles), self.bounds.ids
-        if grouped == "none":
-            return trip.most
-        start, length, _ = self.blocks[0]
-        began = self.bus.clock.now()
-        for _ in range(_GROUPS):
-            self.bus.read_many(ids, start, length, grouped)
-        lasted = (self.bus.clock.now() - began) / _GROUPS
-        return min(max((lasted - trip.median) / (len(ids) - 1), _LEAST), trip.most)
+        return trip, min(max((lasted - trip.median) / (len(ids) - 1), _LEAST), trip.most)
 
     def torque_is_read(self) -> bool:
         """Whether the torque limit is among what is read of every servo."""
         return all("torque_limit" in names for _, _, names in self.blocks)
 
-    def read(self, due: float, rate: float, taken: Taken, lost: Callable[[int], None]) -> None:
+    def read(self, due: float, taken: Taken, lost: Callable[[int], None]) -> None:
         """Read servos in turn until the next frame is near; who did not answer is first in the next frame.
 
         One is read wherever a reading of usual length fits: at the highest rates nothing else would see them.
 
         Args:
             due: when the next frame is to be sent [s of the bus's clock].
-            rate: frames per second.
             taken: called for every answer.
             lost: called with the joint of every answer that is missing.
 
@@ -133,10 +128,7 @@ class Readings:
         """
         grouped = grouping(self.bounds.profiles)
         if grouped != "none":
-            if (
-                self.bus.clock.now() + self.budget.read <= due
-            ):  # else it would make every later frame late too
-                self._read_group(grouped, rate, taken, lost)
+            self._read_group(grouped, due, taken, lost)
             return
         again: list[int] = []
         for count in range(len(self._queue)):
@@ -154,13 +146,20 @@ class Readings:
                 lost(k)
         self._queue.extendleft(reversed(again))
 
-    def _read_group(self, grouped: Grouped, rate: float, taken: Taken, lost: Callable[[int], None]) -> None:
+    def _read_group(self, grouped: Grouped, due: float, taken: Taken, lost: Callable[[int], None]) -> None:
+        """Read as many in one packet as fit, by what that took last time."""
+        now, usual = self.bus.clock.now, self.budget.read
+        began = now()
+        spare = due - began - usual
+        if spare < 0:
+            return  # else all later frames would be late too
         start, length, _ = self.blocks[0]
-        count = max(1, self.budget.reads(rate))
-        chosen = [self._queue[i] for i in range(min(count, len(self._queue)))]
+        chosen = [self._queue[i] for i in range(min(1 + int(spare / self._more), len(self._queue)))]
         self._queue.rotate(-len(chosen))
         ids = [self.bounds.ids[k] for k in chosen]
         replies = self.bus.read_many(ids, start, length, grouped)
+        if len(ids) > 1:
+            self._more = max(self.budget.more, (now() - began - usual) / (len(ids) - 1))
         for k, id in zip(chosen, ids, strict=True):
             if id in replies:
                 taken(k, replies[id])

@@ -93,7 +93,7 @@ def told_wrongly(ended: Ended, table: dict[str, Any]) -> Iterator[str]:
     if ended.outcome == "refused":
         yield from refused_wrongly(ended)
         return
-    if plan.kind == "misconfigured":
+    if plan.kind == "misconfigured" and not within_own_limits(plan, table):
         yield f"played with {plan.registers}"
     if plan.kind == "twin" and not faults:
         yield "two servos with one id went unnoticed"
@@ -118,10 +118,24 @@ def told_wrongly(ended: Ended, table: dict[str, Any]) -> Iterator[str]:
         yield "it stopped before anything had happened"
 
 
+def within_own_limits(plan: Plan, table: dict[str, Any]) -> bool:
+    """Whether limits that a servo was left with are no narrower than its joint's."""
+    servos = table["servos"]
+    name = next(name for name, id in servos["ids"].items() if id == plan.id)
+    joint = next(joint for joint in table["joint"] if joint["name"] == name)
+    turn, zero = servos["direction"].get(name, 1), servos["zero"][name]
+    low, high = sorted(AX_12A.centre + (turn * joint[end] + zero) / AX_12A.tick for end in ("lower", "upper"))
+    own = {"angle_limit_low": 0, "angle_limit_high": 1023} | plan.registers
+    return (
+        len(own) == 2
+        and own["angle_limit_low"] <= math.ceil(low) <= math.floor(high) <= own["angle_limit_high"]
+    )
+
+
 def refused_wrongly(ended: Ended) -> Iterator[str]:
     """A refusal that names nobody, or another; or that comes though nothing has happened."""
     plan, message = ended.plan, ended.message
-    if ended.code == 130:  # before anything had moved
+    if ended.code == 130 or (plan.kind == "pulled" and "the port is gone" in message):  # nobody's fault
         return
     if "latency_timer" in message and plan.adapter > 0.004:
         return

@@ -147,6 +147,35 @@ def test_answers_that_take_longer_than_was_measured_do_not_make_frame_after_fram
     assert rig.gaps <= Thresholds.notice
 
 
+def test_as_many_are_read_in_one_packet_as_the_computer_has_time_for():
+    """A driver that needs longer for an answer than the line does, and was quicker as it was measured."""
+    rig = Rig(0.001, model="MX-28-2")
+    plan, read = rig.player.readings.plan, rig.line.read
+
+    def slow(size: int = 1) -> bytes:
+        data = read(size)
+        rig.clock.sleep(5e-4 if data else 0.0)
+        return data
+
+    def planned(rate: float, interval: float) -> None:
+        plan(rate, interval)
+        rig.line.read = slow
+
+    rig.player.readings.plan = planned
+    outcome = rig.player.play(steps())
+    log = rig.player.log.arrays({})
+    assert outcome.faults == ()
+    assert np.quantile(log["sent"] - log["time"], 0.9) < 0.002, "none but the first of them late"
+    assert rig.gaps <= 0.25
+
+
+def test_a_port_that_is_gone_as_answers_are_measured_is_a_refusal():
+    rig = Rig(0.001)
+    rig.line.inject(InjectedFault("pulled", 0.001))
+    with pytest.raises(SafetyError, match="the servos cannot be asked: the port is gone"):
+        rig.player.readings.plan(50.0, 0.25)
+
+
 def test_who_accepts_to_notice_later_plays_behind_an_adapter_as_it_is_sold():
     rig = Rig(0.016, thresholds=Thresholds(notice=0.8))
     outcome = rig.player.play(steps())
