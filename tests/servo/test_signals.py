@@ -127,7 +127,7 @@ def interrupted(path: Path, out: Path, name: str, after: float, state: str) -> N
         sent = time.monotonic()
         process.send_signal(getattr(signal, name))
         gentle = name in GENTLE
-        allowed = IN_STATE + (RUNS_OUT if gentle else HANGS if name == "SIGSTOP" else 0.0)
+        allowed = IN_STATE + (HANGS if name == "SIGSTOP" else 0.0)
         if state == "limp":
             took = wait_for(lambda: at_rest(terminal.bus, state), terminal, 20)
         else:  # a robot in the soft start may stand still by itself: what counts is the last goal
