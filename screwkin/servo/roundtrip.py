@@ -104,7 +104,8 @@ def latency_timer(port: str) -> int | None:
 
 def latency_advice(port: str = "") -> str:
     """What to do about answers that are held back: the adapter's latency_timer, and the line that sets it."""
-    name = Path(port).resolve().name if port else "ttyUSB0"
+    name = Path(port).resolve().name
+    name = name if name.startswith("tty") else "ttyUSB0"
     line = f"echo 1 | sudo tee {_USB_SERIAL}/{name}/latency_timer"
     timer = latency_timer(port) if port else None
     if timer is None:

@@ -267,6 +267,7 @@ def test_latency_timer_is_read_from_the_system_and_named_with_the_line_that_sets
     link.symlink_to("/dev/ttyUSB3")
     assert latency_timer(str(link)) == 16
     assert f"is 16 ms; set it to 1: echo 1 | sudo tee {timer}" in latency_advice("/dev/ttyUSB3")
+    assert f"{tmp_path}/ttyUSB0/latency_timer" in latency_advice("/dev/pts/3"), "a port without such a timer"
     timer.write_text("1\n")
     assert "another adapter" in latency_advice("/dev/ttyUSB3")
 
