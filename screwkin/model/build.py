@@ -10,6 +10,7 @@ from screwkin.algebra.scalar import Scalar, times
 from screwkin.algebra.screws import INFINITE, Screw
 from screwkin.algebra.se3 import IDENTITY, UNTURNED, ZERO, Pose, Vector, X, Y, Z, rotate
 from screwkin.model.coupled import composed, coupled_joint
+from screwkin.model.link_spring import beam_stiffness
 from screwkin.model.mirror import closes_within, image, interleaved, mirrored_mimics
 from screwkin.model.records import (
     Box,
@@ -20,6 +21,7 @@ from screwkin.model.records import (
     Joint,
     Limb,
     Link,
+    LinkSpring,
     Posture,
     RobotRecord,
     Shape,
@@ -27,7 +29,16 @@ from screwkin.model.records import (
     Sole,
 )
 from screwkin.model.rows import Rows
-from screwkin.model.schema import FrameRow, InertiaRow, JointRow, LimbRow, LinkRow, MirrorRow, ShapeRow
+from screwkin.model.schema import (
+    FrameRow,
+    InertiaRow,
+    JointRow,
+    LimbRow,
+    LinkRow,
+    MirrorRow,
+    ShapeRow,
+    SpringRow,
+)
 from screwkin.model.structure import Mirrored
 
 
@@ -140,7 +151,18 @@ def _link(row: LinkRow, origin: Vector) -> Link:
     com = frame.p if row.com is None else row.com
     boxes = tuple(Box(box.center, box.size) for box in row.boxes)
     shapes = tuple(_shape(shape) for shape in row.shapes)
-    return Link(row.name, row.mass, com, _inertia(row.inertia, row.mass), frame, boxes, shapes)
+    spring = None if row.spring is None else _spring(row.spring)
+    return Link(row.name, row.mass, com, _inertia(row.inertia, row.mass), frame, boxes, shapes, spring)
+
+
+def _spring(row: SpringRow) -> LinkSpring:
+    """The spring of a stiffness matrix, or of a beam's section and material."""
+    K = row.stiffness
+    if row.E and row.G and row.A:
+        moments = row.I[0], row.I[-1]
+        J = sum(moments) if row.J is None else row.J
+        K = beam_stiffness(row.root, row.end, row.E, row.G, row.A, moments, J, row.about).tolist()
+    return LinkSpring(row.root, row.end, tuple(map(tuple, K)))
 
 
 def _shape(row: ShapeRow) -> Shape:

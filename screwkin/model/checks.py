@@ -8,10 +8,12 @@ from typing import Any, get_args
 
 import numpy as np
 
+from screwkin.algebra.se3 import leaves
 from screwkin.errors import Fault
+from screwkin.model.link_spring import MATERIAL, stiffness_faults
 from screwkin.model.records import ShapeKind, Sole
 from screwkin.model.rows import Rows
-from screwkin.model.schema import InertiaRow, JointRow, LinkRow, ShapeRow, SoleRow
+from screwkin.model.schema import InertiaRow, JointRow, LinkRow, ShapeRow, SoleRow, SpringRow
 
 _COMPONENTS = ("xx", "yy", "zz", "xy", "xz", "yz")
 _FLAT = 1e-6  # m: far below what a floor is flat to
@@ -38,6 +40,26 @@ def _link(link: LinkRow) -> Iterator[tuple[str, str, str]]:
         )
     for i, shape in enumerate(link.shapes):
         yield from _shape(f"shapes[{i}]", shape)
+    if link.spring is not None:
+        yield from _spring(link.spring)
+
+
+def _spring(spring: SpringRow) -> Iterator[tuple[str, str, str]]:
+    given = [key for key in (*MATERIAL, "J", "about") if key in spring.model_fields_set]
+    missing = [key for key in MATERIAL if key not in given]
+    along = np.array(leaves(spring.end)) - np.array(leaves(spring.root))
+    if spring.stiffness and given:
+        yield "spring", f"has stiffness and {', '.join(given)}", "Write either a matrix or a beam"
+    elif spring.stiffness:
+        yield from (("spring.stiffness", found, fix) for found, fix in stiffness_faults(spring.stiffness))
+    elif missing:
+        yield "spring", f"{', '.join(missing)} missing", "Write stiffness, or E, G, A and I of a beam"
+    elif not along.any():
+        yield "spring.end", "is the root too", "Write the two ends of a beam"
+    elif len(spring.I) == 2 and spring.I[0] != spring.I[1] and spring.about is None:
+        yield "spring.about", "is missing", "Write the direction of the axis of the first moment"
+    elif spring.about is not None and not np.cross(along, np.array(leaves(spring.about))).any():
+        yield "spring.about", "lies along the beam, or is zero", "Write a direction across it"
 
 
 def _shape(key: str, shape: ShapeRow) -> Iterator[tuple[str, str, str]]:

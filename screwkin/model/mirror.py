@@ -13,7 +13,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any, TypeVar
 
 from screwkin.algebra.se3 import Vector
-from screwkin.model.schema import InertiaRow, JointRow, MimicRow, Row
+from screwkin.model.schema import InertiaRow, JointRow, MimicRow, Row, SpringRow
 
 Item = TypeVar("Item")
 
@@ -115,6 +115,16 @@ def image(
             new["lower"], new["upper"] = 0.0 - row.upper, 0.0 - row.lower
     elif isinstance(row, InertiaRow):
         new["xy"], new["yz"] = -row.xy, -row.yz
+    elif isinstance(row, SpringRow):  # turns about x and z and shifts along y change their signs
+        signs = (-1, 1, -1, 1, -1, 1)
+        new["stiffness"] = (
+            [
+                [x * a * b + 0.0 for x, b in zip(line, signs, strict=True)]
+                for line, a in zip(row.stiffness, signs, strict=True)
+            ]
+            if row.stiffness
+            else []
+        )
     return row.model_copy(update=new)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
 from functools import cache
+from types import UnionType
 from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -146,6 +147,9 @@ def _misfits(value: Any, hint: Any, key: str) -> Iterator[tuple[str, str, str]]:
     elif hint is str or get_origin(hint) is Literal:
         if not isinstance(value, str):
             yield key, f"found {value!r}", "Give a text"
+    elif get_origin(hint) is UnionType:  # a record, or none
+        if value is not None:
+            yield from _misfits(value, get_args(hint)[0], key)
     elif get_origin(hint) is tuple:
         if not isinstance(value, tuple):
             yield key, f"is a {type(value).__name__}", "Give a tuple"

@@ -78,8 +78,27 @@ class Inertia:
 
 
 @dataclass(frozen=True)
+class LinkSpring:
+    """A link that bends: its far part, with all that the link carries, hangs on a spring of six freedoms.
+
+    Attributes:
+        root: where the link begins to bend [m].
+        end: where the spring sits [m].
+        stiffness: six rows of six numbers: wrench [m; f] per displacement [rotation; translation], both at
+            the end, base axes [N m/rad, N/m].
+    """
+
+    root: Vector
+    end: Vector
+    stiffness: tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
 class Link:
-    """A rigid body: mass [kg], CoM, inertia, its own frame, boxes for contact, and shapes beside them."""
+    """A body: mass [kg], CoM, inertia, its own frame, boxes for contact, and shapes beside them.
+
+    It is rigid but for its ``spring``, which ``static_deflection`` allows for.
+    """
 
     name: str
     mass: Scalar
@@ -88,6 +107,7 @@ class Link:
     frame: Pose
     boxes: tuple[Box, ...] = ()
     shapes: tuple[Shape, ...] = ()
+    spring: LinkSpring | None = None
 
 
 @dataclass(frozen=True)

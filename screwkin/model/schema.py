@@ -24,8 +24,10 @@ from screwkin.model.values import (
     Length,
     Lengths,
     Mass,
+    Moments,
     Name,
     Number,
+    Place,
     Point,
     Positive,
     Size,
@@ -90,6 +92,22 @@ class InertiaRow(Row):
     yz: Number = Field(0, description="a number in kg m^2")
 
 
+class SpringRow(Row):
+    """A link that bends: a stiffness matrix at its end, or the section and material of a beam."""
+
+    root: Place = Field(description="[x, y, z] in m, where it begins to bend")
+    end: Place = Field(description="[x, y, z] in m, where what it carries is fixed")
+    stiffness: list[list[Value]] = Field(
+        [], description="six rows of six: [m; f] per [rotation; translation] at the end, base axes"
+    )
+    E: Positive | None = Field(None, description="Young's modulus in Pa")
+    G: Positive | None = Field(None, description="shear modulus in Pa")
+    A: Positive | None = Field(None, description="area of the section in m^2")
+    I: Moments = Field((), description="second moment in m^4, or two: [about, across]")  # noqa: E741
+    J: Positive | None = Field(None, description="torsion constant in m^4; default: the sum of the moments")
+    about: Place | None = Field(None, description="direction of the axis of the first of two moments")
+
+
 class LinkRow(Row):
     """[[link]]: a rigid body. CoM and inertia may be left out of a massless one."""
 
@@ -102,6 +120,7 @@ class LinkRow(Row):
     frame: FrameRow | None = Field(None, description="{ xyz = [x, y, z], rpy = [roll, pitch, yaw] }")
     boxes: list[BoxRow] = Field([], description="[{ center = [x, y, z], size = [lx, ly, lz] }]")
     shapes: list[ShapeRow] = Field([], description='[{ role = "visual", mesh = "foot.stl", frame = {...} }]')
+    spring: SpringRow | None = Field(None, description="{ root, end, and stiffness or E, G, A, I }")
 
 
 class MimicRow(Row):
@@ -205,6 +224,7 @@ _PARTS: Mapping[str, type[Row]] = {
     "boxes": BoxRow,
     "shapes": ShapeRow,
     "mimic": MimicRow,
+    "spring": SpringRow,
 }
 
 Kind = TypeVar("Kind", bound=Row)

@@ -14,7 +14,8 @@ import numpy as np
 from screwkin.algebra.se3 import Pose, Vector
 from screwkin.model.checks import sole_faults
 from screwkin.model.coupled import tightened
-from screwkin.model.records import FLOOR, Inertia, Joint, RobotRecord, Shape, ShapeRole
+from screwkin.model.link_spring import stiffness_faults
+from screwkin.model.records import FLOOR, Inertia, Joint, LinkSpring, RobotRecord, Shape, ShapeRole
 from screwkin.model.structure import RESERVED
 from screwkin.model.values import COUPLINGS, NAME, UNIT_TOLERANCE
 
@@ -91,6 +92,7 @@ def _numbers_certified(robot: RobotRecord) -> bool:
     boxes = [box for link in robot.links for box in link.boxes]
     shapes = [shape for link in robot.links for shape in link.shapes]
     frames += [shape.pose for shape in shapes]
+    springs = [link.spring for link in robot.links if link.spring]
     points = [link.com for link in robot.links] + [joint.screw.s0 for joint in joints]
     points += [frame.p for frame in frames] + [box.center for box in boxes]
     points += [corner for sole in robot.soles for corner in sole.corners]
@@ -102,6 +104,8 @@ def _numbers_certified(robot: RobotRecord) -> bool:
         and bool((_array([box.size for box in boxes]) > 0).all())
         and bool(np.isfinite(_array([box.size for box in boxes])).all())
         and all(map(_is_shape, shapes))
+        and all(map(_is_spring, springs))
+        and robot.base_link not in {link.name for link in robot.links if link.spring}
         and bool((np.abs(lengths - 1) < UNIT_TOLERANCE / 2).all())
         and _are_rotations(frames)
         and bool(np.isfinite(_moments([link.inertia for link in robot.links])).all())
@@ -151,6 +155,11 @@ def _is_shape(shape: Shape) -> bool:
         and len(shape.colour) in (0, 3)
         and all(0 <= c <= 1 for c in shape.colour)
     )
+
+
+def _is_spring(spring: LinkSpring) -> bool:
+    sound = np.isfinite(_array([spring.root, spring.end])).all()
+    return bool(sound) and not any(True for _ in stiffness_faults(spring.stiffness))
 
 
 def _is_joint(joint: Joint) -> bool:

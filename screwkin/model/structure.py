@@ -46,6 +46,11 @@ def structure_faults(rows: Rows, mirrored: Iterable[Mirrored]) -> Iterator[Fault
     yield from _tree_faults(rows)
     yield from _sole_faults(rows, named)
     yield from _closure_faults(rows)
+    base = rows.robot.text("base_link")
+    for entry in rows["link"]:
+        if "spring" in entry.raw and entry.text("name") == base:
+            fix = "Give springs to the links that it carries"
+            yield Fault(entry.where, "spring", "is of the base link", fix)
 
 
 def _closure_faults(rows: Rows) -> Iterator[Fault]:

@@ -123,6 +123,8 @@ def _link(link: Link, origin: Vector, folder: Path | None) -> dict[str, Any]:
         row["boxes"] = _plain(link.boxes)
     if link.shapes:
         row["shapes"] = [_shape(shape, folder) for shape in link.shapes]
+    if link.spring is not None:
+        row["spring"] = _row(link.spring)
     return row
 
 

@@ -123,6 +123,20 @@ def _positive(value: object, info: ValidationInfo) -> float:
     return number
 
 
+def _place(value: object, info: ValidationInfo) -> Vector:
+    """A vector that stays one of numbers in the symbolic twin."""
+    if not isinstance(value, list) or len(value) != 3:
+        raise _wrong(f"{value!r} is no vector", "Write three numbers, as [x, y, z]")
+    return Vector(*(_value(component, info) for component in value))
+
+
+def _moments(value: object, info: ValidationInfo) -> tuple[float, ...]:
+    moments = value if isinstance(value, list) else [value]
+    if len(moments) not in (1, 2):
+        raise _wrong(f"{value!r} is no pair", "Write one second moment in m^4, or two: [about, across]")
+    return tuple(_positive(item, info) for item in moments)
+
+
 def _name(value: object) -> str:
     if not isinstance(value, str) or not NAME.fullmatch(value):
         fix = "Write letters, digits, _ and -, beginning with a letter"
@@ -149,6 +163,8 @@ Unit = Annotated[Vector, PlainValidator(_unit)]
 Factors = Annotated[Vector, PlainValidator(_factors)]
 Length = Annotated[Scalar, PlainValidator(_length)]
 Lengths = Annotated[tuple[Scalar, ...], PlainValidator(_lengths)]
+Place = Annotated[Vector, PlainValidator(_place)]
+Moments = Annotated[tuple[float, ...], PlainValidator(_moments)]
 Colour = Annotated[tuple[float, ...], PlainValidator(_colour)]
 Size = Annotated[Vector, PlainValidator(_positive_vector)]
 Chain = Annotated[tuple[str, ...], PlainValidator(_chain)]

@@ -21,7 +21,7 @@ def test_the_small_table_itself_is_sound():
 def test_an_unknown_key_is_told_with_the_nearest_and_all_valid_ones():
     fault = only_fault(changed(THIGH, THIGH + "\nmas = 3"))
     assert (fault.row, fault.key, fault.found) == ("[[link]] 2 'right_thigh'", "mas", "is unknown")
-    assert fault.fix == "Did you mean 'mass'? Keys: name, mass, com, inertia, frame, boxes, shapes"
+    assert fault.fix == "Did you mean 'mass'? Keys: name, mass, com, inertia, frame, boxes, shapes, spring"
 
 
 def test_an_unknown_key_in_an_inline_table_is_told_with_its_place():
