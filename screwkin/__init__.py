@@ -7,7 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from screwkin.analysis.validate import Validation, validate
+    from screwkin.compliance.cartesian import cartesian_stiffness
     from screwkin.compliance.commands import compensate
+    from screwkin.compliance.stiffness import static_deflection
     from screwkin.dynamics.contact import ContactPatch
     from screwkin.dynamics.contact_forces import contact_forces
     from screwkin.dynamics.forward import forward_dynamics
@@ -48,7 +50,9 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "analysis.validate": "Validation validate",
+    "compliance.cartesian": "cartesian_stiffness",
     "compliance.commands": "compensate",
+    "compliance.stiffness": "static_deflection",
     "dynamics.contact": "ContactPatch",
     "dynamics.contact_forces": "contact_forces",
     "dynamics.forward": "forward_dynamics",
@@ -96,6 +100,7 @@ __all__ = [
     "VirtualChain",
     "action_matrix",
     "bind",
+    "cartesian_stiffness",
     "center_of_mass",
     "close_loops",
     "closed_mechanism",
@@ -126,6 +131,7 @@ __all__ = [
     "secondary_rates",
     "singularity_report",
     "solve_pose",
+    "static_deflection",
     "static_forces",
     "tip_poses",
     "validate",

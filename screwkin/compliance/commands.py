@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from screwkin.algebra.arrays import Array, numpy_of
 from screwkin.algebra.scalar import is_jax
-from screwkin.compliance.springs import StiffnessChoice, joint_stiffness
-from screwkin.errors import InputError, LimitError, expect, one_of
+from screwkin.compliance.laws import Spring, checked_springs, spring_deflection
+from screwkin.compliance.springs import SpringChoice, spring_stiffness
+from screwkin.errors import LimitError, expect
 from screwkin.kinematics import limits
 from screwkin.kinematics.arrays import checked
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
-
-Spring = Sequence[tuple[float, float]]
-"""A spring as a table: pairs of deflection [rad or m] and effort [N m or N], increasing, through zero."""
 
 
 def compensate(
     robot: Robot,
     state: State,
     efforts: Any,
-    stiffness: StiffnessChoice = None,
+    stiffness: SpringChoice = None,
     springs: Mapping[str, Spring] | None = None,
 ) -> Array:
     """Positions to command to elastic drives so that the joints stand at the state under their efforts.
@@ -36,9 +34,11 @@ def compensate(
         state: where base and joints are to be, q (..., n).
         efforts: (..., n) of the joints there [N m or N]: ``inverse_dynamics`` beyond the base's six rows, or
             ``static_forces`` of a robot that stands.
-        stiffness: one number for all joints, or by joint name with ``default`` [N m/rad or N/m]; default: the
-            table's.
-        springs: by joint name, springs whose stiffness changes: tables of (deflection, effort).
+        stiffness: one number for all joints, or by joint name with ``default`` [N m/rad or N/m], an array
+            (...) of one for each sample where it changes with time; default: the table's. A joint without a
+            motor has no drive to command: its position stays.
+        springs: by joint name, springs whose stiffness changes with their deflection: tables of (deflection,
+            effort), or functions of deflections (...) that return efforts (...) and their slopes (...).
 
     Returns:
         (..., n) positions to command [rad or m].
@@ -47,6 +47,7 @@ def compensate(
         UnknownNameError: no such joint. ShapeError: a wrong shape, NaN or infinity.
         InputError: a stiffness is no positive number, or a spring's table does not increase through zero.
         LimitError: a command is beyond a joint's limits, or an effort beyond the end of a spring's table.
+        NoSolutionError: a spring's function does not reach the effort.
 
     Example:
         >>> import numpy as np, screwkin as sk
@@ -59,45 +60,23 @@ def compensate(
     """
     expect(robot, Robot, "robot", 'load_robot("NAME")')
     expect(state, State, "state", "State(T_world_base, q)")
-    count, tables = len(robot.joints), dict(springs or {})
-    q, load = checked("state.q", state.q, count), checked("efforts", efforts, count)
-    for name in tables:
-        one_of("joint", name, robot.joint_names)
-    k = _stiffness(robot, stiffness, tables)
+    q, load = (
+        checked(what, x, len(robot.joints)) for what, x in (("state.q", state.q), ("efforts", efforts))
+    )
+    laws = checked_springs(robot, springs)
+    k = spring_stiffness(robot, stiffness, [robot.joint_names[i] for i in laws])
+    k = np.where(k > 0, k, np.inf)  # of a drive that is not there
     xp = numpy_of(q, load)
     columns = [
-        _deflection(name, tables[name], load[..., i]) if name in tables else load[..., i] / k[i]
+        spring_deflection(name, laws[i], load[..., i]) if i in laws else load[..., i] / k[..., i]
         for i, name in enumerate(robot.joint_names)
     ]
+    batch = np.broadcast_shapes(load.shape[:-1], *(x.shape for x in columns))
+    columns = [xp.broadcast_to(x, batch) for x in columns]
     commands: Array = q + xp.stack(columns, axis=-1) if columns else q
     if not is_jax(commands):
         _check_limits(robot, commands)
     return commands
-
-
-def _stiffness(robot: Robot, choice: StiffnessChoice, tables: Mapping[str, Spring]) -> Array:
-    """(n,) of all joints; those with a table need none."""
-    if choice is None or not isinstance(choice, Mapping):
-        return joint_stiffness(robot, choice)
-    return joint_stiffness(robot, {**dict.fromkeys(tables, 1.0), **choice})
-
-
-def _deflection(name: str, table: Spring, effort: Array) -> Array:
-    """How far a spring given by a table is deflected by an effort."""
-    pairs = checked(f"springs[{name!r}]", table, 2)
-    if pairs.ndim != 2 or len(pairs) < 2 or (np.diff(pairs, axis=0) <= 0).any():
-        raise InputError(f"springs[{name!r}]: deflections and efforts must increase from pair to pair")
-    if abs(np.interp(0.0, pairs[:, 0], pairs[:, 1])) > 0 or not pairs[0, 0] <= 0 <= pairs[-1, 0]:
-        raise InputError(f"springs[{name!r}] has an effort without deflection; give a pair (0, 0)")
-    xp = numpy_of(effort)
-    if not is_jax(effort) and ((effort < pairs[0, 1]) | (effort > pairs[-1, 1])).any():
-        worst = float(np.ravel(effort)[np.abs(np.ravel(effort)).argmax()])
-        raise LimitError(
-            f"{name} carries {worst:.4g}, and its spring's table ends at {pairs[0, 1]:.4g} and "
-            f"{pairs[-1, 1]:.4g}; give further pairs"
-        )
-    deflection: Array = xp.interp(effort, pairs[:, 1], pairs[:, 0])
-    return deflection
 
 
 def _check_limits(robot: Robot, commands: Array) -> None:

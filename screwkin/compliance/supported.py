@@ -49,9 +49,9 @@ class Supported:
         return self.robot.path_to(self.robot.frame(self.support)[0])
 
     def path(self, link: str) -> tuple[int, ...]:
-        """Joints between the support and a link; their order does not matter here."""
+        """Joints between the support and a link, from the support on."""
         above = self.robot.path_to(link)
-        return tuple(i for i in self.stance if i not in above) + tuple(
+        return tuple(i for i in reversed(self.stance) if i not in above) + tuple(
             i for i in above if i not in self.stance
         )
 
@@ -65,13 +65,20 @@ class Supported:
         """World pose of a frame."""
         return self.base @ pose_in_base(self.robot, self.displacements, frame)
 
+    def path_twists(self, frame: str) -> list[tuple[int, Twist]]:
+        """Joints of ``robot.tree`` between support and frame, from there on, and the frame's twist by each.
+
+        Per unit rate, at the frame's own origin.
+        """
+        p = self.base.R @ pose_in_base(self.robot, self.displacements, frame).p
+        return [(k, at(p, self.twists[k])) for k in self.path(self.robot.frame(frame)[0])]
+
     def jacobian(self, frame: str) -> dict[int, Twist]:
         """Index in q to the frame's twist per unit rate, at the frame's own origin; other joints: none."""
-        p = self.base.R @ pose_in_base(self.robot, self.displacements, frame).p
         columns: dict[int, Twist] = {}
-        for k in self.path(self.robot.frame(frame)[0]):
+        for k, twist in self.path_twists(frame):
             i, ratio = self.robot.gears[k]
-            columns[i] = columns.get(i, NO_TWIST) + at(p, self.twists[k]) * ratio
+            columns[i] = columns.get(i, NO_TWIST) + twist * ratio
         return columns
 
     @cached_property

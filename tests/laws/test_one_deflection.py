@@ -13,8 +13,9 @@ import screwkin as sk
 from screwkin.analysis.workspace import workspace
 from screwkin.compiler import native
 from screwkin.compiler.run import compile_program
+from screwkin.compliance.balance import Loaded
 from screwkin.compliance.deflection import newton_step
-from screwkin.compliance.equilibrium import Loaded
+from screwkin.compliance.equilibrium import balances
 from screwkin.compliance.stiffness import static_deflection
 from screwkin.dynamics.margin import support_margin
 from screwkin.ik.reach import reach
@@ -46,10 +47,9 @@ def test_a_margin_does_not_depend_on_its_neighbours(seed, feet, corners, grid):
 
 def conditions(robot, state, support, k, theta):
     """Condition (B,) of the matrix of springs and weight at deflections theta (B, n)."""
-    everyone, T = np.arange(len(theta)), np.broadcast_to(state.T_world_base, (len(theta), 4, 4))
+    T = np.broadcast_to(state.T_world_base, (len(theta), 4, 4))
     loaded = Loaded(robot, support, T, state.q, np.full(theta.shape[1], k), GRAVITY)
-    _, slope = loaded.balance(everyone)(theta, everyone)
-    return np.linalg.cond(slope)
+    return np.concatenate([np.linalg.cond(here.slope) for _, here in balances(loaded, theta)])
 
 
 def batch_matters_not(robot, state, support, k, method):

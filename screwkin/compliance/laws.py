@@ -1,0 +1,94 @@
+"""Springs whose stiffness changes with their deflection: tables and functions, and what deflects them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from screwkin.algebra.arrays import Array, numpy_of
+from screwkin.algebra.newton import newton
+from screwkin.algebra.scalar import is_jax
+from screwkin.errors import InputError, LimitError, NoSolutionError, one_of
+from screwkin.kinematics.arrays import checked
+from screwkin.model.robot import Robot
+
+Spring = Sequence[tuple[float, float]] | Callable[[Array], tuple[Array, Array]]
+"""A spring's law: pairs of deflection [rad or m] and effort [N m or N] that increase through zero, straight
+lines between; or a function of deflections (...) that returns efforts (...) and their slopes (...)."""
+
+REACHED = 1e-12
+"""Largest error of a deflection that a function's spring is solved for [rad or m]."""
+
+
+def checked_springs(robot: Robot, springs: Mapping[str, Spring] | None) -> dict[int, Spring]:
+    """Laws by index in q; tables as arrays of pairs.
+
+    Raises:
+        UnknownNameError: no such joint. InputError: a table does not increase, or has an effort at rest.
+    """
+    laws: dict[int, Spring] = {}
+    for name, spring in (springs or {}).items():
+        one_of("joint", name, robot.joint_names)
+        laws[robot.joint_names.index(name)] = spring if callable(spring) else _pairs(name, spring)
+    return laws
+
+
+def spring_effort(law: Any, deflection: Array) -> tuple[Array, Array]:
+    """Effort and slope (...) of a law at deflections (...); beyond a table's ends its last lines go on."""
+    if callable(law):
+        effort, slope = (np.broadcast_to(np.asarray(x, float), deflection.shape) for x in law(deflection))
+        return effort, slope
+    slopes = np.diff(law[:, 1]) / np.diff(law[:, 0])
+    piece = np.clip(np.searchsorted(law[:, 0], deflection, side="right") - 1, 0, len(slopes) - 1)
+    return law[piece, 1] + slopes[piece] * (deflection - law[piece, 0]), slopes[piece]
+
+
+def spring_deflection(name: str, law: Any, effort: Array) -> Array:
+    """Deflection (...) at which a law has an effort (...).
+
+    Raises:
+        LimitError: it is beyond a table's ends. NoSolutionError: a function does not reach it.
+    """
+    if not callable(law):
+        refuse_beyond(name, law[:, 1], effort, "carries")
+        deflection: Array = numpy_of(effort).interp(effort, law[:, 1], law[:, 0])
+        return deflection
+    if is_jax(effort):
+        raise InputError(f"springs[{name!r}] is a function, which is solved in NumPy; give a table of pairs")
+    wanted = np.ravel(np.asarray(effort, dtype=float))
+
+    def residual(x: Array, at: Array) -> tuple[Array, Array]:
+        here, slope = spring_effort(law, x[:, 0])
+        stiff = np.where(slope > 0, slope, np.nan)
+        return ((wanted[at] - here) / stiff)[:, None], np.ones((len(at), 1, 1))
+
+    solved = newton(residual, np.zeros((len(wanted), 1)), REACHED)
+    if not (solved.residual <= REACHED).all():
+        worst = wanted[int((~(solved.residual <= REACHED)).argmax())]
+        raise NoSolutionError(
+            f"{name} carries {worst:.4g}, and its spring's function does not rise to it from rest; its slope "
+            "must be positive"
+        )
+    return solved.x.reshape(np.shape(effort))
+
+
+def refuse_beyond(name: str, ends: Array, values: Any, verb: str) -> None:
+    """Raise a LimitError for values beyond the two ends of a spring's table."""
+    if is_jax(values) or not ((values < ends[0]) | (values > ends[-1])).any():
+        return
+    worst = float(np.ravel(values)[np.abs(np.ravel(values)).argmax()])
+    raise LimitError(
+        f"{name} {verb} {worst:.4g}, and its spring's table ends at {ends[0]:.4g} and {ends[-1]:.4g}; give "
+        "further pairs"
+    )
+
+
+def _pairs(name: str, table: Any) -> Any:
+    pairs = checked(f"springs[{name!r}]", table, 2)
+    if pairs.ndim != 2 or len(pairs) < 2 or (np.diff(pairs, axis=0) <= 0).any():
+        raise InputError(f"springs[{name!r}]: deflections and efforts must increase from pair to pair")
+    if abs(np.interp(0.0, pairs[:, 0], pairs[:, 1])) > 0 or not pairs[0, 0] <= 0 <= pairs[-1, 0]:
+        raise InputError(f"springs[{name!r}] has an effort without deflection; give a pair (0, 0)")
+    return pairs
