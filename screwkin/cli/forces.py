@@ -11,7 +11,8 @@ import typer
 
 from screwkin.algebra.arrays import Array
 from screwkin.cli.forces_along import FRICTION, VALIDATED, ForceSettings, forces_along
-from screwkin.cli.options import AsJson, OutputFolder, assignment, assignments, numbers_of
+from screwkin.cli.loads import LOAD_HELP, first_posture, loads_of
+from screwkin.cli.options import AsJson, OutputFolder, assignments, numbers_of
 from screwkin.cli.output import aligned, print_json
 from screwkin.errors import InputError
 from screwkin.mechanism.action_choice import ActionChoice, action_choice
@@ -36,8 +37,7 @@ def forces(
         list[str] | None,
         typer.Option(
             metavar="NAME=VALUES",
-            help="JOINT=EFFORT, or LINK=FX,FY,FZ at its origin, or LINK=FX,FY,FZ@X,Y,Z at a world point, or "
-            "LINK=MX,MY,MZ,FX,FY,FZ about the world's origin [N m, N, m]; may be repeated.",
+            help=LOAD_HELP,
         ),
     ] = None,
     weights: Annotated[bool, typer.Option("--weights", help="Add the weights of the links.")] = False,
@@ -121,11 +121,11 @@ def _statics(
     as_json: bool,
 ) -> int:
     """Equilibrium of a robot in a posture."""
-    loads, imposed = _loads(load), assignments("--impose", impose, "object.fy=-5")
+    loads, imposed = loads_of(load), assignments("--impose", impose, "object.fy=-5")
     if not (loads or imposed or weights):
         raise InputError("nothing loads it; add --load NAME=VALUES, --impose ACTION=VALUE or --weights")
     mechanism = closed_mechanism(robot)
-    state = _turned(home(robot, posture or _first_posture(robot)), down)
+    state = _turned(home(robot, posture or first_posture(robot)), down)
     result = static_forces(mechanism, state, loads, imposed, weights=weights, active=active, contacts=contact)
     choice = action_choice(mechanism, None, result.system.active, result.system.contacts)
     if as_json:
@@ -137,7 +137,7 @@ def _statics(
 
 def _closed_form(robot: Robot, load: Sequence[str], active: Sequence[str] | None, as_json: bool) -> int:
     """Efforts of a linkage in symbols."""
-    loads = _loads(load)
+    loads = loads_of(load)
     if len(loads) != 1 or not isinstance(next(iter(loads.values())), float):
         raise InputError("--symbolic takes one load on a joint; write --load rocker=10")
     (name,) = loads
@@ -153,31 +153,6 @@ def _closed_form(robot: Robot, load: Sequence[str], active: Sequence[str] | None
     )
     print(f"  positions: {where}")
     return 0
-
-
-def _first_posture(robot: Robot) -> str:
-    names = [posture.name for posture in robot.postures]
-    return "home" if "home" in names or not names else names[0]
-
-
-def _loads(texts: Sequence[str]) -> dict[str, Any]:
-    """Loads by name: an effort, a force, or a wrench about the world's origin."""
-    loads: dict[str, Any] = {}
-    for text in texts:
-        name, values = assignment("--load", text, "rocker=10")
-        before, _, place = values.partition("@")
-        numbers = numbers_of(before, f"--load {name}", (1, 3, 6))
-        value: Any = numbers[0] if len(numbers) == 1 else np.array(numbers)
-        if place:
-            if len(numbers) != 3:
-                raise InputError(
-                    f"--load {text!r}: a place belongs to a force of three numbers, FX,FY,FZ@X,Y,Z"
-                )
-            value = np.concatenate([np.cross(numbers_of(place, f"--load {name}", (3,)), value), value])
-        if name in loads:
-            raise InputError(f"--load {name} is given twice; add the two up")
-        loads[name] = value
-    return loads
 
 
 def _turned(state: State, down: str | None) -> State:

@@ -11,11 +11,14 @@ import typer
 
 from screwkin.analysis.map_arrays import deflection_arrays
 from screwkin.analysis.stiffness_maps import DeflectionMap, stiffness_maps
+from screwkin.cli.loads import LOAD_HELP
 from screwkin.cli.maps import Heights, LimbName, MapResult, Pictures, Resolution, reached_maps, run_maps
 from screwkin.cli.options import AsJson, OutputFolder, RobotName
 from screwkin.cli.output import progress_bar
+from screwkin.cli.stiffness_at import stiffness_at
 from screwkin.compliance.springs import joint_stiffness
 from screwkin.compliance.stiffness import Method
+from screwkin.errors import InputError
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
 
@@ -33,10 +36,23 @@ def stiffness(
         bool, typer.Option("--nonlinear", help="The equilibrium of springs and weight, not its first order.")
     ] = False,
     support: Annotated[
-        str | None, typer.Option(help="The tip that stands still; default: the other leg's.")
+        list[str] | None,
+        typer.Option(help="The tip that stands still; default: the other leg's. Two: see --at."),
     ] = None,
     posture: Annotated[
         str | None, typer.Option(help="Of all other joints, by name; default: all zero.")
+    ] = None,
+    at: Annotated[
+        str | None,
+        typer.Option(
+            metavar="POSTURE",
+            help="In this posture instead of maps: how joints and links yield to weight and loads, and how "
+            "stiff a frame is. So too, at home, with --load, --frame or several --support.",
+        ),
+    ] = None,
+    load: Annotated[list[str] | None, typer.Option(metavar="NAME=VALUES", help=LOAD_HELP)] = None,
+    frame: Annotated[
+        str | None, typer.Option(help="The frame whose stiffness is shown; default: the base, else a tip.")
     ] = None,
     plots: Pictures = True,
     output: OutputFolder = None,
@@ -45,16 +61,25 @@ def stiffness(
     """Deflection of a swinging foot under the robot's weight, all over its workspace, in single support.
 
     Files: stiffness.npz and pictures, one of all heights and one for each. For maps at unit stiffness
-    use --stiffness 1.
+    use --stiffness 1. In one posture nothing is written. Exit code 3 where a robot collapses under its loads.
     """
     table = load_robot(robot)
+    if at or load or frame or len(support or ()) > 1:
+        of_maps = {
+            "--limb": limb, "--heights": heights, "--posture": posture, "--nonlinear": nonlinear,
+            "--no-plots": not plots, "--output": output,
+        }  # fmt: skip
+        given = [name for name, value in of_maps.items() if value not in (None, False)]
+        if given:
+            raise InputError(f"{', '.join(given)}: of maps, not of one posture (--at, --load); leave it out")
+        return stiffness_at(table, at, support, k, load or [], frame, as_json)
     joint_stiffness(table, k)  # refused before the workspace is computed
     method: Method = "nonlinear" if nonlinear else "linear"
 
     def compute() -> MapResult:
         places = reached_maps(table, limb, heights, resolution)
         with progress_bar("deflections") as done:
-            maps = stiffness_maps(table, places, k, method, support, posture, done)
+            maps = stiffness_maps(table, places, k, method, support[0] if support else None, posture, done)
         title = f"{table.name} on its {maps[0].support}: deflection of the {places[0].tip} ({method})"
         data = stiffness_data(table, maps)
         return MapResult(deflection_arrays(maps), data, title, _rows(maps), _pictures(table, maps))

@@ -101,3 +101,41 @@ def test_wrong_input_is_told_once(cli, refused, words, named):
 def test_a_refusal_is_json_too(cli):
     called = cli("workspace", "poppy12", "--heights", "0.6", *COARSE, "--json")
     assert json.loads(called.out)["exit_code"] == called.code == 3
+
+
+ON_BOTH = ("--support", "right_foot", "--support", "left_foot")
+
+
+def test_stiffness_of_a_posture_shows_loads_supports_and_a_frames_matrix(cli):
+    words = ("stiffness", "bioloid", "--at", "home", *ON_BOTH, "--load", "base=10,0,0", "-k", 20)
+    said = cli(*words, "--json").data
+    assert said["support"] == ["right_foot", "left_foot"]
+    np.testing.assert_allclose(np.sum([*said["wrenches"].values()], axis=0)[3:], [-10, 0, 16.677], atol=1e-6)
+    K, C = np.array(said["cartesian_stiffness"]), np.array(said["compliance"])
+    np.testing.assert_allclose(K @ C, np.eye(6), atol=1e-8)
+    assert said["frame"] == "base"
+    assert said["change"]["base"][3] == pytest.approx(5.6719e-3, abs=1e-6)
+    text = cli(*words).out
+    assert "bioloid at home on right_foot, left_foot: loaded equilibrium" in text
+    assert "-5.0000     0.0000     8.3385" in text
+    assert "-0.0000" not in text
+
+
+def test_a_loop_under_load_is_shown_as_compliance_where_it_is_rigid(cli):
+    text = cli("stiffness", "linkages/four-bar", "--load", "rocker=0.1", "-k", 20).out
+    assert "rocker is rigid in some direction" in text
+    assert (
+        cli("stiffness", "linkages/four-bar", "--load", "rocker=0.1", "-k", 20, "--json").data[
+            "cartesian_stiffness"
+        ]
+        is None
+    )
+
+
+def test_a_robot_that_collapses_is_the_answer_no(cli, refused):
+    assert "collapse" in refused(cli("stiffness", "bioloid", "--at", "home", "-k", "0.1"), 3)
+
+
+def test_options_of_maps_and_of_a_posture_do_not_mix(cli, refused):
+    message = refused(cli("stiffness", "poppy12", "--load", "base=1,0,0", "--nonlinear"), 2)
+    assert "--nonlinear: of maps, not of one posture" in message
