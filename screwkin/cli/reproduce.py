@@ -103,7 +103,11 @@ def _text(result: Reproduction) -> str:
         if section.lines:
             cells = [row[:4] for row in section.cells]
             parts += ["", section.title, aligned([("", "paper", "ours", ""), *cells], "  ")]
-    differing = [f"  {line.item}: {line.note}" for line in result.lines if line.agrees is False]
+    differing = [
+        f"  {line.item}: {line.note} In the paper: {line.source}"
+        for line in result.lines
+        if line.agrees is False
+    ]
     if differing:
         parts += ["", "where they differ", *differing]
     return "\n".join([*parts, "", result.summary, *filter(None, [result.repetition])])

@@ -2,8 +2,9 @@
 
 A file in ``papers/`` holds ``[paper]`` (name, title, source, robot, and ``changes`` to its gaits, if any) and
 ``[[section]]`` (place, title, text) with rows and pictures. A row has ``item``, ``measure``, and as far as
-there are any ``with`` (the measure's arguments), ``paper`` (the printed value), ``note``, ``unit``, ``form``
-(how ours is written) and ``within`` (how far apart equal values may be).
+there are any ``with`` (the measure's arguments), ``paper`` (the paper's value), ``note``, ``unit``, ``form``
+(how ours is written) and ``within`` (how far apart equal values may be). A value of the paper comes with the
+span of text that it stands in, ``quote``, the number of its ``line`` in the text, and its ``kind``.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
@@ -37,19 +38,29 @@ UNITS: Mapping[str, float] = {
 """How many of a unit make one of the SI."""
 
 
+Kind = Literal["printed", "damaged", "reading", "words"]
+"""What the value of a paper is.
+
+A number that stands in the quotation, or does but for damage of the scan; what follows from a printed rule,
+as docs/papers.md reads it; or what the paper says, or lets expect, in words.
+"""
+
 _STRICT = ConfigDict(extra="forbid")
 _ALIASES = {"with_": "with", "rows": "row", "pictures": "picture", "sections": "section"}
 
 
 @dataclass(frozen=True)
 class Claim:
-    """One line: what the paper prints, and the measure that returns our value."""
+    """One line: what the paper says, and where, and the measure that returns our value."""
 
     __pydantic_config__ = _STRICT
     item: str
     measure: str
     with_: Annotated[Mapping[str, Any], Field(alias="with")] = field(default_factory=dict)
     paper: Any = None
+    line: int = 0
+    quote: str = ""
+    kind: Kind = "printed"
     note: str = ""
     unit: str = ""
     form: str = ""
@@ -116,10 +127,14 @@ def parse_paper(text: str, path: str = "<text>") -> Paper:
         raise FileFaults(path, [*map(_fault, wrong.errors(include_url=False)), *faults]) from None
     for number, section in enumerate(paper.sections, 1):
         for k, row in enumerate(section.rows, 1):
+            where = f"section {number}, row {k}"
             if row.unit and row.unit not in UNITS:
                 fix = f"Write one of {', '.join(UNITS)}"
-                where = f"section {number}, row {k}"
                 faults.append(Fault(where, "unit", f"unknown unit {row.unit!r}", fix))
+            if (row.paper is None) == bool(row.quote and row.line > 0):
+                what = "a value of the paper without quotation" if row.paper is not None else "no value of it"
+                fix = "Give paper, quote and line (of the paper's text, from 1) together, or none of them"
+                faults.append(Fault(where, "paper", what, fix))
     if faults:
         raise FileFaults(path, faults)
     return paper

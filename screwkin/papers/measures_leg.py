@@ -20,6 +20,8 @@ from screwkin.gait.stance import stance_of
 from screwkin.papers.bench import Bench
 from screwkin.trajectory import Trajectory
 
+Limits = Mapping[str, Sequence[float]]
+"""Other ranges [rad] of joints, by name."""
 POSES = 2000
 """Random poses of the comparison of inverse kinematics."""
 FINE, COARSE = 0.0025, 0.005
@@ -56,21 +58,25 @@ def _number(row: IkRow, key: str) -> float:
     return value
 
 
-def map_of(bench: Bench, limb: str, height: float, grid: float = FINE) -> WorkspaceMap:
+def map_of(
+    bench: Bench, limb: str, height: float, grid: float = FINE, limits: Limits | None = None
+) -> WorkspaceMap:
     """The workspace of a limb at a height of the waist above its tip, computed once."""
-    key = ("workspace", limb, height, grid)
-    return bench.once(key, lambda: workspace(bench.robot, limb, [height], grid)[0])
+    changed = {joint: (float(lower), float(upper)) for joint, (lower, upper) in (limits or {}).items()}
+    robot = bench.robot.replace(limits=changed) if changed else bench.robot
+    key = ("workspace", limb, height, grid, *sorted(changed.items()))
+    return bench.once(key, lambda: workspace(robot, limb, [height], grid)[0])
 
 
-def reach(bench: Bench, limb: str, height: float, key: str = "area") -> float:
+def reach(bench: Bench, limb: str, height: float, key: str = "area", limits: Limits | None = None) -> float:
     """Area [m^2] that a limb reaches with its tip level, or the median condition number there."""
-    place = map_of(bench, limb, height)
+    place = map_of(bench, limb, height, limits=limits)
     return float(getattr(place, one_of("number of a workspace", key, ("area", "median_condition"))))
 
 
-def cut_at(bench: Bench, limb: str, height: float, at: Sequence[float]) -> str:
+def cut_at(bench: Bench, limb: str, height: float, at: Sequence[float], limits: Limits | None = None) -> str:
     """What decides at a place [m] of the waist frame: reachable, out of reach, or the limit of a joint."""
-    place = map_of(bench, limb, height)
+    place = map_of(bench, limb, height, limits=limits)
     i, j = (int(np.abs(axis - value).argmin()) for axis, value in zip((place.x, place.y), at, strict=True))
     return place.causes[int(place.cause[i, j])].replace("_", " ")
 

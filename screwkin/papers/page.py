@@ -22,7 +22,7 @@ from screwkin.report.page import figure_html
 from screwkin.report.style import DPI, styled
 
 _COLOURS = 256
-_HEAD = ("item", "paper", "ours", "", "note")
+_HEAD = ("item", "paper", "ours", "", "note", "in the paper’s text (line)")
 
 
 @dataclass(frozen=True)
@@ -161,8 +161,9 @@ def _table(measured: MeasuredSection) -> str:
     rows = [
         f'<tr><td>{_text(item)}</td><td class="number">{_text(paper)}</td>'
         f'<td class="value">{_text(ours)}</td>'
-        f'<td class="{mark or "soft"}">{mark}</td><td class="soft">{_text(note)}</td></tr>'
-        for item, paper, ours, mark, note in measured.cells
+        f'<td class="{mark or "soft"}">{mark}</td><td class="soft">{_text(note)}</td>'
+        f'<td class="soft">{_text(source)}</td></tr>'
+        for item, paper, ours, mark, note, source in measured.cells
     ]
     return f'<div class="wide"><table><tr>{head}</tr>{"".join(rows)}</table></div>'
 
@@ -185,7 +186,7 @@ td.same { color: var(--good); }
 td.differs { color: var(--bad); font-weight: 600; }
 td.number, td.value { white-space: normal; min-width: 6.5rem; overflow-wrap: anywhere; }
 td:first-child { min-width: 12rem; }
-td:last-child { min-width: 16rem; }
+td:nth-child(5), td:last-child { min-width: 16rem; }
 """
 
 _PAGE = """\

@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from screwkin.errors import MissingDependencyError
 from screwkin.papers.bench import Bench
-from screwkin.papers.claims import UNITS, Claim, Paper, Section, Value
+from screwkin.papers.claims import UNITS, Claim, Kind, Paper, Section, Value
 from screwkin.papers.measures import MEASURES, check_call
 from screwkin.papers.scatter import ALIKE, FEW, ROUNDING, Scatter
+
+_KINDS: dict[Kind, str] = {
+    "printed": "printed numbers",
+    "damaged": "numbers that the scan has damaged",
+    "reading": "values read from rules (docs/papers.md)",
+    "words": "claims in words",
+}
 
 MARKS = {True: "same", False: "differs", None: ""}
 """How a row's agreement is written."""
@@ -26,13 +33,16 @@ class ClaimResult:
 
     Attributes:
         item: table, figure or claim of the paper, with the unit.
-        paper: what is printed; None where the paper prints no value.
+        paper: the paper's value; None where it has none.
         ours: what was measured; None if a package for it is absent.
         note: where and why they differ, or how ours is meant.
         agrees: whether they are equal, within what the row allows; None if they cannot be compared.
         form: how ours is written.
         span: least and greatest of runs that differ by rounding, of which ours is the median.
         runs: how many; None if nothing was simulated.
+        quote: what of the paper's text the value stands in; empty without a value.
+        line: where in its text.
+        kind: what the paper's value is; see ``claims.Kind``.
     """
 
     item: str
@@ -43,6 +53,16 @@ class ClaimResult:
     form: str = ""
     span: tuple[float, float] | None = None
     runs: int | None = None
+    quote: str = ""
+    line: int = 0
+    kind: Kind = "printed"
+
+    @property
+    def source(self) -> str:
+        """The quotation for a page, with its line and, where it is no printed number, its kind."""
+        if not self.quote:
+            return ""
+        return f"“{self.quote}” ({self.line}{'' if self.kind == 'printed' else f'; {self.kind}'})"
 
     @property
     def shown(self) -> str:
@@ -80,8 +100,8 @@ class MeasuredSection:
         return f"{self.section.place}: {self.section.title}"
 
     @property
-    def cells(self) -> list[tuple[str, str, str, str, str]]:
-        """Item, paper, ours, mark and note of every line, without the section's place."""
+    def cells(self) -> list[tuple[str, str, str, str, str, str]]:
+        """Item, paper, ours, mark, note and quotation of every line, without the section's place."""
         return [
             (
                 line.item.removeprefix(f"{self.section.place}: "),
@@ -89,6 +109,7 @@ class MeasuredSection:
                 line.shown,
                 MARKS[line.agrees],
                 line.remark,
+                line.source,
             )
             for line in self.lines
         ]
@@ -106,17 +127,17 @@ class Reproduction:
         """All rows."""
         return tuple(line for measured in self.sections for line in measured.lines)
 
-    def count(self, agrees: bool | None) -> int:
-        """How many rows agree (True), differ (False) or cannot be compared (None)."""
-        return sum(line.agrees is agrees for line in self.lines)
-
     @property
     def summary(self) -> str:
-        """How many values agree, in a sentence."""
-        return (
-            f"{len(self.lines)} rows: {self.count(True)} as printed, {self.count(False)} different, each "
-            f"with its reason, and {self.count(None)} measured where the paper prints no number."
-        )
+        """How many values of each kind agree, in a sentence."""
+        parts = []
+        for kind, what in _KINDS.items():
+            lines = [line for line in self.lines if line.quote and line.kind == kind]
+            agreed = sum(line.agrees is True for line in lines)
+            parts += [f"{agreed} of {len(lines)} {what} come out"] if lines else []
+        free = sum(not line.quote for line in self.lines)
+        parts += [f"{free} are ours alone, where the paper has no value"] if free else []
+        return f"{len(self.lines)} rows: {'; '.join(parts)}. Notes say why the others do not."
 
     @property
     def repetition(self) -> str:
@@ -171,19 +192,30 @@ def _item(section: Section, row: Claim) -> str:
 
 
 def _measured(section: Section, row: Claim, bench: Bench) -> ClaimResult:
-    item, form = _item(section, row), row.form
+    quoted = ClaimResult(
+        _item(section, row),
+        row.paper,
+        None,
+        row.note,
+        None,
+        row.form,
+        None,
+        None,
+        row.quote,
+        row.line,
+        row.kind,
+    )
     try:
         value = MEASURES[row.measure](bench, **row.with_)
     except MissingDependencyError as error:
-        return ClaimResult(item, row.paper, None, f"not measured: {error}", None, form)
+        return replace(quoted, note=f"not measured: {error}")
     factor, span, runs = UNITS.get(row.unit, 1.0), None, None
     if isinstance(value, Scatter):
         runs = len(value.values)
         span = value.span and (value.span[0] * factor, value.span[1] * factor)
         value = value.middle
     ours = _scaled(value, factor)
-    agrees = agreement(row.paper, ours, row.within)
-    return ClaimResult(item, row.paper, ours, row.note, agrees, form, span, runs)
+    return replace(quoted, ours=ours, agrees=agreement(row.paper, ours, row.within), span=span, runs=runs)
 
 
 def _scaled(value: Value, factor: float) -> Value:

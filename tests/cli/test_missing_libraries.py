@@ -38,7 +38,7 @@ robot = "poppy12"
 [[section]]
 place = "Table 2"
 title = "Masses"
-row = [{ item = "total", measure = "mass", paper = 1.21, unit = "kg" }]
+row = [{ item = "total", measure = "mass", paper = 1.21, line = 1, quote = "1.21", unit = "kg" }]
 [[section.picture]]
 draw = "reach_maps"
 caption = "Reach"

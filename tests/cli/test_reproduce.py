@@ -14,7 +14,7 @@ robot = "bioloid"
 [[section]]
 place = "Table 1"
 title = "masses"
-row = [{ item = "robot", measure = "mass", paper = 1.7, unit = "kg", note = "all of it" }]
+row = [{ item = "robot", measure = "mass", paper = 1.7, line = 1, quote = "1.7", unit = "kg", note = "all of it" }]
 """
 
 
@@ -42,7 +42,7 @@ def test_the_text_sets_both_values_side_by_side_and_sums_up(cli, paper, tmp_path
     called = cli("reproduce", paper, "-o", "out", "--no-plots")
     assert called.code == 0
     assert "robot [kg]  1.7    1.7   same" in called.out
-    assert "1 rows: 1 as printed, 0 different" in called.out
+    assert "1 rows: 1 of 1 printed numbers come out" in called.out
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["rows.json"]
 
 

@@ -36,8 +36,9 @@ robot = "bioloid"
 place = "Table 9"
 title = "two masses"
 row = [
-  { item = "torso", measure = "mass", with = { link = "torso" }, paper = 674.8, unit = "kg", note = "x | g" },
-  { item = "whole", measure = "mass", paper = 1.7, unit = "kg" },
+  { item = "torso", measure = "mass", with = { link = "torso" }, paper = 674.8, \
+line = 1, quote = "674,8", unit = "kg", note = "x | g" },
+  { item = "whole", measure = "mass", paper = 1.7, line = 2, quote = "1.7", kind = "damaged", unit = "kg" },
   { item = "knee", measure = "axis", with = { joint = "right_knee" } },
 ]
 picture = [{ draw = "feet_along_z", caption = "Feet of `paper`.", with = { gait = "paper", steps = 1 } }]
@@ -106,7 +107,10 @@ def test_a_value_that_differs_is_told_with_its_unit():
         ("Table 9: whole [kg]", True),
         ("Table 9: knee", None),
     ]
-    assert found.summary.startswith("3 rows: 1 as printed, 1 different")
+    assert found.summary == (
+        "3 rows: 0 of 1 printed numbers come out; 1 of 1 numbers that the scan has damaged come out; 1 "
+        "are ours alone, where the paper has no value. Notes say why the others do not."
+    )
 
 
 def test_a_changed_robot_table_no_longer_agrees(tmp_path):
@@ -162,6 +166,9 @@ def test_values_are_written_for_people(value, form, text):
         ('joint = "right_knee"', 'jiont = "right_knee"', InputError, "unknown arguments jiont and missing"),
         ('joint = "right_knee"', 'joint = "knee"', UnknownNameError, "right_knee"),
         ('unit = "kg", note', 'unit = "g", note', FileFaults, "section 1, row 1, key unit: unknown unit 'g'"),
+        ('quote = "1.7", ', "", FileFaults, "row 2, key paper: a value of the paper without quotation"),
+        ("paper = 1.7, ", "", FileFaults, "row 2, key paper: no value of it"),
+        ('kind = "damaged"', 'kind = "sure"', FileFaults, "kind: found 'sure'"),
         ('title = "two masses"', "", FileFaults, "section 1, key title: missing"),
         ('place = "Table 9"', 'place = "Table 9"\nplaec = 1', FileFaults, "plaec: unknown key"),
         ("[[section]]", "[section]", FileFaults, "no list of tables"),
@@ -191,7 +198,8 @@ def test_the_pages_show_values_reasons_and_pictures_and_stand_alone(tmp_path):
     pictures = draw_pictures(paper, bench, tmp_path)
     readme, report = write_pages(found, pictures, tmp_path, "screwkin reproduce small", "Python 3")
     text, html = readme.read_text(encoding="utf-8"), report.read_text(encoding="utf-8")
-    assert "| torso [kg] | 674.8 | 0.6748 | differs | x \\| g |" in text
+    assert "| torso [kg] | 674.8 | 0.6748 | differs | x \\| g | “674,8” (1) |" in text
+    assert "“1.7” (2; damaged) |" in text
     assert "![Feet of paper.](01-feet-along-z.png)" in text
     assert (tmp_path / "01-feet-along-z.png").read_bytes().startswith(b"\x89PNG")
     assert "A &lt;small&gt; paper" in html
