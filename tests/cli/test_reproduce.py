@@ -14,7 +14,7 @@ robot = "bioloid"
 [[section]]
 place = "Table 1"
 title = "masses"
-row = [{ item = "robot", measure = "mass", paper = 1.7, line = 1, quote = "1.7", unit = "kg", note = "all of it" }]
+row = [{ item = "robot", measure = "mass", paper = 1.7, line = 1, quote = "1.7", unit = "kg", note = "all" }]
 """
 
 
@@ -30,7 +30,7 @@ def test_json_holds_item_paper_ours_and_note_of_every_row(cli, paper, tmp_path):
     assert called.code == 0
     assert called.err == ""
     (row,) = called.data["rows"]
-    assert (row["item"], row["paper"], row["note"]) == ("Table 1: robot [kg]", 1.7, "all of it")
+    assert (row["item"], row["paper"], row["note"]) == ("Table 1: robot [kg]", 1.7, "all")
     assert row["ours"] == pytest.approx(1.7, abs=1e-12)
     assert {path.name for path in (tmp_path / "out").iterdir()} == {"README.md", "report.html", "rows.json"}
     assert json.loads((tmp_path / "out" / "rows.json").read_text(encoding="utf-8"))["rows"] == [row]

@@ -24,8 +24,10 @@ robot = "bioloid"
 place = "Figure 1"
 title = "simulated"
 row = [
-  { item = "error", measure = "simulated", with = { key = "zmp_max_mm", GAIT }, paper = 7.0, line = 1, quote = "7" },
-  { item = "stands", measure = "simulated", with = { key = "passed", GAIT }, paper = "yes", line = 1, quote = "so", kind = "words" },
+  { item = "error", measure = "simulated", with = { key = "zmp_max_mm", GAIT }, paper = 7, \
+line = 1, quote = "7" },
+  { item = "stands", measure = "simulated", with = { key = "passed", GAIT }, paper = "yes", \
+line = 1, quote = "so", kind = "words" },
   { item = "falls at", measure = "simulated", with = { key = "fell_at", GAIT }, unit = "ms" },
 ]
 """.replace("GAIT", 'gait = "paper", steps = 1')
