@@ -19,6 +19,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.compliance.springs import StiffnessChoice
 from screwkin.errors import InputError
 from screwkin.gait.compensation import WAYS, compensate_walk, way_of
+from screwkin.gait.ground import ground_of
 from screwkin.model.robot import Robot
 from screwkin.sim.compliant import STEP, Compliance, SpringServos
 from screwkin.sim.measure import ZmpRecord, zmp_record
@@ -191,7 +192,8 @@ def _trial(
         sole_damping=conditions.sole_damping,
     )
     compliance = Compliance(stiffness, conditions.joint_damping, conditions.rotor_inertia)
-    backend = PyBulletBackend(robot, physics, servos=SpringServos(robot, compliance, dt))
+    servos = SpringServos(robot, compliance, dt)
+    backend = PyBulletBackend(robot, physics, servos=servos, terrain=ground_of(commanded))
     try:
         run = simulate(robot, commanded, backend, conditions.schedule)
     finally:

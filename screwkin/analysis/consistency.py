@@ -22,6 +22,7 @@ from screwkin.analysis.account import check_tips, closure_of
 from screwkin.dynamics.support import sole_corners
 from screwkin.gait.balance import Balance, zmp
 from screwkin.gait.compensation import compensate_walk, stiffness_of, way_of
+from screwkin.gait.ground import ground_of
 from screwkin.gait.intended import intended
 from screwkin.model.robot import Robot
 from screwkin.trajectory import Trajectory, check_joints
@@ -115,10 +116,11 @@ def _closure_faults(closure: Mapping[str, tuple[float, float]]) -> Iterator[str]
 
 def _standing_faults(robot: Robot, trajectory: Trajectory) -> Iterator[str]:
     """Soles in contact that are off the floor or move, and soles below the floor."""
+    terrain = ground_of(trajectory)
     for i, foot in enumerate(trajectory.feet):
         T, stands = trajectory.T_world_tip[foot], trajectory.contact[:, i]
         corners = np.einsum("tij,kj->tki", T[:, :3, :3], sole_corners(robot, foot)) + T[:, None, :3, 3]
-        height = corners[..., 2]
+        height = terrain.above_ground(corners)
         floats = stands & ~(np.abs(height).max(axis=1) <= STANDS)
         if floats.any():
             yield f"{foot} is in contact but off the floor at {trajectory.time[int(floats.argmax())]:.2f} s"

@@ -18,6 +18,7 @@ from screwkin.dynamics.contact_forces import ContactForces, contact_forces
 from screwkin.dynamics.support import sole_corners
 from screwkin.errors import InputError
 from screwkin.files import read_file
+from screwkin.gait.ground import ground_of
 from screwkin.kinematics.limits import limited_joints
 from screwkin.kinematics.mass import GRAVITY
 from screwkin.model.state import State
@@ -132,7 +133,7 @@ def simulated_forces(
     """Forces of the feet and torques of the servos while a simulator plays a trajectory."""
     compliance = SimulatedCompliance().on(servo).for_trajectory(account.robot, account.trajectory)
     commands = compliance.commands(account.robot, account.trajectory)
-    backend = opened(account.robot, engine, compliance)
+    backend = opened(account.robot, engine, compliance, terrain=ground_of(account.trajectory))
     try:
         run = simulate(account.robot, commands, backend, progress=progress, start=account.motion.q[0])
     finally:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal, TypeVar
 
 from screwkin.compliance.springs import joint_stiffness
+from screwkin.dynamics.terrain import FLAT, Terrain
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.gait.compensation import WAYS, compensate_walk, stiffness_of, way_of
 from screwkin.model.robot import Robot
@@ -141,6 +142,7 @@ def opened(
     compliance: SimulatedCompliance,
     gui: bool = False,
     finer: Refinement | None = None,
+    terrain: Terrain = FLAT,
 ) -> Backend:
     """The simulator of that name, with the robot in it.
 
@@ -150,6 +152,7 @@ def opened(
         compliance: see ``SimulatedCompliance``.
         gui: show a window.
         finer: than its usual settings.
+        terrain: to stand on.
 
     Raises:
         InputError: it has no contact forces, or no elastic soles.
@@ -174,8 +177,8 @@ def opened(
     if motors:
         servos = MotorServos(motors, physics.dt, str(compliance.motors))
     if isinstance(physics, Physics):
-        return PyBulletBackend(robot, physics, gui, servos)
-    return MuJoCoBackend(robot, physics, gui, servos)
+        return PyBulletBackend(robot, physics, gui, servos, terrain)
+    return MuJoCoBackend(robot, physics, gui, servos, terrain)
 
 
 P = TypeVar("P", Physics, MuJoCoPhysics)

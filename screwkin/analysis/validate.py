@@ -18,6 +18,7 @@ from screwkin.errors import InputError
 from screwkin.files import text_sha256
 from screwkin.gait.balance import zmp as balance_of
 from screwkin.gait.compensation import stiffness_of, way_of
+from screwkin.gait.ground import ground_of
 from screwkin.gait.intended import intended
 from screwkin.kinematics.limits import limited_joints
 from screwkin.model.robot import Robot, robot_text
@@ -106,14 +107,14 @@ def validate(
     compliance = (compliance or SimulatedCompliance()).on(servo).for_trajectory(robot, trajectory)
     commands = motion or compliance.commands(robot, trajectory)
     start = (motion or intended(robot, trajectory)).q[0]
-    names = engines_for(engine, robot, compliance)
+    names, terrain = engines_for(engine, robot, compliance), ground_of(trajectory)
     ways = _FINER if check_solver and names != ("kinematic",) else {"usual": Refinement()}
     first = (0.2 if compliance.repeat else 1.0) / (len(names) * len(ways))
     done = 0
 
     def played(name: Engine, finer: Refinement) -> Validation:
         nonlocal done
-        backend = opened(robot, name, compliance, gui and not done, finer)
+        backend = opened(robot, name, compliance, gui and not done, finer, terrain)
         try:
             run = simulate(
                 robot,
@@ -171,7 +172,8 @@ def film(robot: Robot, trajectory: Trajectory, run: Run, camera: Camera) -> tupl
     """Pictures of a run at even times of the trajectory, up to the end of what was seen."""
     times = np.linspace(trajectory.time[0], trajectory.time[-1], camera.pictures)
     rows = np.searchsorted(run.time, times[times <= run.time[-1] + 1e-9] - 1e-9)
-    return tuple(pictures(robot, run.time[rows], run.T_world_base[rows], run.q[rows], camera))
+    seen = run.time[rows], run.T_world_base[rows], run.q[rows]
+    return tuple(pictures(robot, *seen, camera, ground_of(trajectory)))
 
 
 def _check_fit(robot: Robot, trajectory: Trajectory) -> None:

@@ -13,6 +13,8 @@ from screwkin.algebra.pytrees import pytree
 from screwkin.dynamics.margin import support_margin
 from screwkin.dynamics.quantities import balance
 from screwkin.dynamics.support import Spike, sole_corners, spikes
+from screwkin.dynamics.terrain import FLAT, Terrain
+from screwkin.gait.ground import ground_of
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 from screwkin.trajectory import Trajectory, check_joints
@@ -48,10 +50,30 @@ class Balance:
         return np.asarray(np.linalg.norm(self.com[:, :2] - self.zmp, axis=1))
 
 
-def soles_on_floor(robot: Robot, feet: tuple[str, ...], T_world_tip: Mapping[str, Array]) -> Array:
+def soles_on_floor(
+    robot: Robot,
+    feet: tuple[str, ...],
+    T_world_tip: Mapping[str, Array],
+    terrain: Terrain = FLAT,
+    wrench: Array | None = None,
+) -> Array:
     """Corners of every sole seen from above, (T, feet, corners, 2) [m]; soles may differ in corner count.
 
-    A sole that leans touches with its lowest corners only: in place of the others stands the lowest.
+    On terrain that is not flat, corners at other heights than z = 0 are carried along the ground's force f
+    onto z = 0: a corner p stands at p_xy - p_z f_xy / f_z. The ZMP is the point of z = 0 on the line of the
+    ground's force. It lies in the hull of the corners so carried exactly where forces at the corners, all
+    parallel to f and none of them pulling, add up to the ground's wrench but for its moment about that line.
+    So the margin is the same in whichever horizontal plane it is taken; on a flat floor it is the usual one.
+
+    A sole that leans against the floor touches with its lowest corners only: in place of the others stands
+    the lowest.
+
+    Args:
+        robot: with soles.
+        feet: tips of the feet.
+        T_world_tip: their poses (T, 4, 4).
+        terrain: slope and blocks.
+        wrench: the ground's [m; f] (T, 6), world axes; without it corners are seen from above.
     """
     outlines = [sole_corners(robot, foot) for foot in feet]
     most = max(len(outline) for outline in outlines)
@@ -61,9 +83,17 @@ def soles_on_floor(robot: Robot, feet: tuple[str, ...], T_world_tip: Mapping[str
         for foot, corners in zip(feet, padded, strict=True)
     ]
     corners = np.stack(placed, axis=1)
-    lowest = np.take_along_axis(corners, corners[..., 2].argmin(axis=-1)[..., None, None], axis=-2)
-    lifted = corners[..., 2:] > lowest[..., 2:] + TOUCH
-    return np.where(lifted, lowest, corners)[..., :2]
+    height = corners[..., 2] if terrain.flat else terrain.above_plane(corners)
+    at = height.argmin(axis=-1)[..., None]
+    lowest = np.take_along_axis(corners, at[..., None], axis=-2)
+    lifted = height > np.take_along_axis(height, at, axis=-1) + TOUCH
+    corners = np.where(lifted[..., None], lowest, corners)
+    if terrain.flat or wrench is None:
+        return corners[..., :2]
+    pressing = np.where(wrench[:, 5] > 0, wrench[:, 5], np.inf)
+    return np.asarray(
+        corners[..., :2] - corners[..., 2:] * (wrench[:, 3:5] / pressing[:, None])[:, None, None]
+    )
 
 
 def ground_reaction(
@@ -128,6 +158,6 @@ def zmp(robot: Robot, trajectory: Trajectory) -> Balance:
         trajectory.base_twist,
         trajectory.base_acceleration,
     )
-    soles = soles_on_floor(robot, trajectory.feet, trajectory.T_world_tip)
+    soles = soles_on_floor(robot, trajectory.feet, trajectory.T_world_tip, ground_of(trajectory), wrench)
     margin = ground_margin(point, com, wrench, soles, trajectory.contact)
     return Balance(point, com, wrench, margin, spikes(trajectory.time, com[:, :2], point), cart)

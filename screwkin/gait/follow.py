@@ -14,6 +14,7 @@ from screwkin.gait.preview_plan import preview_plan
 from screwkin.gait.realise import differentiate, posed_hands, positions
 from screwkin.gait.record import Gait
 from screwkin.gait.resting import held_arms
+from screwkin.gait.slope import tilted
 from screwkin.gait.stance import stance_of
 from screwkin.ik.pose_solution import PoseSolution
 from screwkin.mechanism.choice import closed_mechanism
@@ -30,7 +31,7 @@ class Followed:
     Attributes:
         drive: what moves.
         mechanism: of what moves.
-        planned: T samples.
+        planned: T samples, in the world.
         solution: joint positions.
         motion: joint rates and accelerations.
         notes: why limbs rest, and which linkages come near a dead point.
@@ -88,7 +89,7 @@ def follow(robot: Robot, gait: Gait, steps: int, at_rest: tuple[str, ...] = ()) 
                 raise
             at_rest, notes = (*at_rest, error.limb), (*notes, _rests(robot, gait, error.limb, str(error)))
         else:
-            return Followed(drive, mechanism, planned, solution, motion, (*notes, *near))
+            return Followed(drive, mechanism, tilted(planned), solution, motion, (*notes, *near))
 
 
 def _rests(robot: Robot, gait: Gait, arm: str, why: str) -> str:

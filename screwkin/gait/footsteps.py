@@ -18,12 +18,14 @@ from screwkin.gait.stance import LEFT, RIGHT, Stance
 
 _BELOW = 1e-9  # m: what rounding may put below the floor
 _ABOVE = 1.05  # of lift: a spline may overshoot its highest key point so far
+ALOFT = 0.5
+"""Share of a lift onto a higher foothold, or of the way down to a lower one, with no motion ahead."""
 _EDGE = 1e-9  # of a step: rounding of the phase at the ends of a swing
 
 
 @dataclass(frozen=True)
 class Foothold:
-    """Where a foot stands: x, y [m] and yaw [rad] in the world; ``step`` is the swing that ends there.
+    """Where a foot stands: x, y, z [m] and yaw [rad] on the floor; ``step`` is the swing that ends there.
 
     The step of the two footholds of the start is -1.
     """
@@ -33,6 +35,7 @@ class Foothold:
     x: float
     y: float
     yaw: float
+    z: float = 0.0
 
 
 def first_side(gait: Gait) -> int:
@@ -72,7 +75,7 @@ def footholds(gait: Gait, stance: Stance, steps: int) -> tuple[Foothold, ...]:
     if gait.places:
         yaws = np.unwrap([0.0, *(place.yaw for place in gait.places)])[1:].tolist()
         ends = [
-            Foothold(stance.foot(swing_side(gait, n)).name, n, place.x, place.y, yaw)
+            Foothold(stance.foot(swing_side(gait, n)).name, n, place.x, place.y, yaw, place.z)
             for n, (place, yaw) in enumerate(zip(gait.places[:steps], yaws, strict=False))
         ]
         return (hold(lead, -1, 0.0), hold(-lead, -1, 0.0), *ends)
@@ -114,7 +117,9 @@ def feet_motion(
 ) -> tuple[dict[str, Motion], NDArray[np.bool_]]:
     """Motion of the feet, x, y, z, yaw (T, 4) by name, and which of them are in contact, (T, feet).
 
-    A foot in contact stands on its foothold to the last bit, with no rate and no acceleration.
+    A foot in contact stands on its foothold to the last bit, with no rate and no acceleration. To a higher
+    foothold it rises while it is lifted, to a lower one it sinks while it is set down, by quintics, and
+    only the rest of that time takes it ahead, so that it passes the edges of what it steps onto or leaves.
 
     Args:
         gait: its swings.
@@ -125,36 +130,73 @@ def feet_motion(
     steps = max(hold.step for hold in holds) + 1
     n = np.clip(np.floor(phase.value).astype(int), 0, steps - 1)
     fraction = Motion(phase.value - n, phase.rate, phase.acceleration)
-    progress, height = (along(spline, fraction) for spline in swing_splines(gait))
-    liftoff, landing = gait.channels["foot_height"].at[[0, -1]]
+    forward, upward = swing_splines(gait)
+    height = along(upward, fraction)
+    channel = gait.channels["foot_height"]
+    liftoff, landing = channel.at[[0, -1]]
+    apex = channel.at[int(np.argmax(channel.value))]
+    climb, sink = (along(_passed(*ends), fraction) for ends in ((liftoff, apex), (apex, landing)))
+    late, early = liftoff + ALOFT * (apex - liftoff), landing - ALOFT * (landing - apex)
+    ahead = [along(forward, fraction)]
+    ahead += [
+        along(forward, _hastened(fraction, *ends))
+        for ends in ((late, landing, liftoff, landing), (liftoff, early, liftoff, landing))
+    ]
     landed = fraction.value >= landing - _EDGE
     in_air = (fraction.value > liftoff + _EDGE) & ~landed
     motions, contact = {}, []
     for foot in stance.feet:
         own = [hold for hold in holds if hold.foot == foot.name]
-        places = np.array([[hold.x, hold.y, hold.yaw] for hold in own])
+        places = np.array([[hold.x, hold.y, hold.yaw, hold.z] for hold in own])
         swings = np.array([any(hold.step == k for hold in own) for k in range(steps)])
         before = np.cumsum(swings) - swings  # swings that a step finds behind it
         origin, target = places[before][n], places[before + swings][n]
         moving = swings[n] & in_air
         stands = np.where(landed[:, None], target, origin)
-        motions[foot.name] = _swung(origin, target - origin, progress, height, moving, stands)
+        way = target - origin
+        up, down = way[:, 3] > 0, way[:, 3] < 0
+        rise, progress = _chosen(up, climb, sink), _chosen(up, ahead[1], _chosen(down, ahead[2], ahead[0]))
+        motions[foot.name] = _swung(origin, way, progress, height, rise, moving, stands)
         contact.append(~moving)
     return motions, np.column_stack(contact)
 
 
+def _hastened(fraction: Motion, start: float, end: float, first: float, last: float) -> Motion:
+    """The fraction of a step that goes from ``first`` to ``last`` between two others, and rests beyond."""
+    faster = (last - first) / (end - start)
+    inside = (fraction.value > start) & (fraction.value < end)
+    value = first + faster * (fraction.value.clip(start, end) - start)
+    return Motion(value, *(np.where(inside, faster * x, 0.0) for x in (fraction.rate, fraction.acceleration)))
+
+
+def _passed(start: float, end: float) -> Any:
+    """From 0 to 1 between two fractions of a step, at rest beyond them."""
+    return held_constant(minimum_jerk(np.array([start, end]), np.array([0.0, 1.0])))
+
+
+def _chosen(condition: NDArray[np.bool_], a: Motion, b: Motion) -> Motion:
+    pairs = ((a.value, b.value), (a.rate, b.rate), (a.acceleration, b.acceleration))
+    return Motion(*(np.where(condition, *pair) for pair in pairs))
+
+
 def _swung(
-    origin: Array, way: Array, progress: Motion, height: Motion, moving: NDArray[np.bool_], stands: Array
+    origin: Array,
+    way: Array,
+    progress: Motion,
+    height: Motion,
+    rise: Motion,
+    moving: NDArray[np.bool_],
+    stands: Array,
 ) -> Motion:
-    """x, y, z, yaw (T, 4): from ``origin`` along ``way`` (x, y, yaw) while moving, else on ``stands``."""
+    """x, y, z, yaw (T, 4): from ``origin`` along ``way`` (x, y, yaw, z) while moving, else on ``stands``."""
 
-    def joined(flat: Array, up: Array, still: Array) -> Array:
-        flat = np.where(moving[:, None], flat, still)
-        return np.column_stack([flat[:, :2], np.where(moving, up, 0.0), flat[:, 2]])
+    def joined(along: Array, up: Array, still: Array) -> Array:
+        flat = np.where(moving[:, None], along, still)
+        return np.column_stack([flat[:, :2], np.where(moving, up, still[:, 3]), flat[:, 2]])
 
-    rest = np.zeros_like(stands)
+    rest, by = np.zeros_like(stands), way[:, 3]
     return Motion(
-        joined(origin + progress.value[:, None] * way, height.value, stands),
-        joined(progress.rate[:, None] * way, height.rate, rest),
-        joined(progress.acceleration[:, None] * way, height.acceleration, rest),
+        joined(origin + progress.value[:, None] * way, origin[:, 3] + height.value + rise.value * by, stands),
+        joined(progress.rate[:, None] * way, height.rate + rise.rate * by, rest),
+        joined(progress.acceleration[:, None] * way, height.acceleration + rise.acceleration * by, rest),
     )

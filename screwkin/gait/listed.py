@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from screwkin.errors import Fault, GaitError, InputError, near
-from screwkin.gait.places import KEYS, StepEnd, read_places
+from screwkin.gait.places import HEIGHT, KEYS, StepEnd, read_places
 from screwkin.gait.record import CHOICES, Gait, Side, gait_from_dict
 from screwkin.model.toml import read_text
 
@@ -22,7 +22,7 @@ FOOT = "foot"
 class Footsteps:
     """Where a walk's steps end, one after the other, feet alternating; from ``footsteps``.
 
-    places: of the foot that swings, in the world. first: the foot that swings first.
+    places: of the foot that swings, on the floor. first: the foot that swings first.
     """
 
     places: tuple[StepEnd, ...]
@@ -38,8 +38,10 @@ def footsteps(places: Iterable[Sequence[float]], first: Side = "right") -> Foots
     The robot starts with its feet side by side, the middle between them over the origin, facing along x.
 
     Args:
-        places: (x, y, yaw) of every step, x, y [m] and yaw [rad] of the frame of the foot that swings, in the
-            world; feet alternate. A yaw is meant as the one nearest to that of the step before.
+        places: (x, y, yaw) or (x, y, yaw, z) of every step, x, y, z [m] and yaw [rad] of the frame of the
+            foot that swings, in the frame of the floor, which is the world's on a level one; feet alternate.
+            A yaw is meant as the one nearest to that of the step before. Under every foothold that is
+            higher than the lowest (the start is at 0) the plan supposes a block just larger than the sole.
         first: ``right`` or ``left``: the foot that swings first.
 
     Returns:
@@ -62,7 +64,7 @@ def footsteps(places: Iterable[Sequence[float]], first: Side = "right") -> Foots
 
 
 def load_footsteps(path: str | Path) -> Footsteps:
-    """The footsteps of a CSV file with the columns ``x, y, yaw`` [m, rad] and, if wanted, ``foot``.
+    """The footsteps of a CSV file with the columns ``x, y, yaw`` and, if wanted, ``z`` [m, rad] and ``foot``.
 
     Args:
         path: of the file. Numbers may be formulas, such as ``10*deg``. Without ``foot`` the right foot swings
@@ -74,7 +76,7 @@ def load_footsteps(path: str | Path) -> Footsteps:
     lines = list(csv.reader(io.StringIO(read_text(Path(path), GaitError)), skipinitialspace=True))
     rows = [(i, line) for i, line in enumerate(lines, 1) if any(cell.strip() for cell in line)]
     names = [name.strip() for name in rows[0][1]] if rows else []
-    known = [*KEYS, FOOT]
+    known = [*KEYS, HEIGHT, FOOT]
     faults = [
         Fault("row 1", name, "unknown column", f"{near(name, known)}Valid: {', '.join(known)}")
         for name in names
@@ -121,7 +123,7 @@ def with_footsteps(gait: Gait, steps: Footsteps) -> Gait:
         raise GaitError(gait.path or f"gait {gait.name}", [Fault("[gait]", "kind", found, fix)])
     document = gait.to_dict()
     document["gait"] |= {"kind": "footsteps", "first": steps.first}
-    document["foothold"] = [{"x": place.x, "y": place.y, "yaw": place.yaw} for place in steps.places]
+    document["foothold"] = [place.to_dict() for place in steps.places]
     return gait_from_dict(document, gait.path)
 
 
@@ -130,10 +132,10 @@ def _row(i: int, place: Any) -> dict[str, Any]:
         values = [float(value) for value in place]
     except (TypeError, ValueError):
         values = []
-    if len(values) != len(KEYS):
-        fix = "Expected (x, y, yaw), two lengths [m] and an angle [rad]"
+    if len(values) not in (len(KEYS), len(KEYS) + 1):
+        fix = "Expected (x, y, yaw) or (x, y, yaw, z), lengths [m] and an angle [rad]"
         raise GaitError("footsteps", [Fault(f"step {i + 1}", "", f"{place!r} is no foothold", fix)])
-    return dict(zip(KEYS, values, strict=True))
+    return dict(zip((*KEYS, HEIGHT), values, strict=False))
 
 
 def _read(rows: Sequence[dict[str, Any]], first: Side, where: str) -> Footsteps:

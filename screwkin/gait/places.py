@@ -12,15 +12,23 @@ from screwkin.model.expression import ExpressionError, UnresolvedError, evaluate
 
 KEYS = ("x", "y", "yaw")
 """What a row ``[[foothold]]`` holds."""
+HEIGHT = "z"
+"""What it may hold beside: the height of the foothold [m], else 0."""
 
 
 @dataclass(frozen=True)
 class StepEnd:
-    """Where a step ends: x, y [m] and yaw [rad] of the foot that swings, in the world."""
+    """Where a step ends: x, y, z [m] and yaw [rad] of the foot that swings, in the floor's frame."""
 
     x: float
     y: float
     yaw: float
+    z: float = 0.0
+
+    def to_dict(self) -> dict[str, float]:
+        """As a row ``[[foothold]]``; level with the floor there is no z."""
+        row = {"x": self.x, "y": self.y, "yaw": self.yaw}
+        return row | {HEIGHT: self.z} if self.z else row
 
 
 def read_places(
@@ -29,7 +37,7 @@ def read_places(
     """The rows ``[[foothold]]`` of a gait.
 
     Args:
-        rows: tables with ``KEYS``, numbers or formulas.
+        rows: tables with ``KEYS`` and perhaps ``HEIGHT``, numbers or formulas.
         numbers: parameters of the gait by name; None for one that is itself faulty.
         unknown: names of those that depend on a robot which is not known yet; what depends on them is NaN.
         faults: collects what is wrong.
@@ -42,10 +50,11 @@ def read_places(
     for i, row in enumerate(rows):
         name = f"[[foothold]] {i + 1}"
         for key in row:
-            if key not in KEYS:
-                fix = f"{near(key, KEYS)}Valid: {', '.join(KEYS)}"
+            if key not in (*KEYS, HEIGHT):
+                fix = f"{near(key, (*KEYS, HEIGHT))}Valid: {', '.join((*KEYS, HEIGHT))}"
                 faults.append(Fault(name, key, "unknown key", fix))
-        values = [_number(name, key, row, numbers, unknown, faults) for key in KEYS]
+        keys = (*KEYS, HEIGHT) if HEIGHT in row else KEYS
+        values = [_number(name, key, row, numbers, unknown, faults) for key in keys]
         if None not in values:
             places.append(StepEnd(*(float(value) for value in values if value is not None)))
     return tuple(places)

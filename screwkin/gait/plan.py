@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
+from screwkin.dynamics.terrain import Terrain
 from screwkin.errors import Fault, GaitError, InputError
 from screwkin.gait.footsteps import Foothold, feet_motion, footholds
+from screwkin.gait.ground import check_edges, planned_terrain
 from screwkin.gait.hands import hands_motion
 from screwkin.gait.motion import Motion, carried_frame, level_pose, level_twist
 from screwkin.gait.path import path_of
@@ -28,14 +30,15 @@ LEAST_SHOWN = 2  # samples of a swing below which a trajectory does not show tha
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """Targets over T samples, world axes; arrays are read-only.
+    """Targets over T samples, in the floor's frame; arrays are read-only.
 
     time (T,) [s]; phase (T,) [steps]; T_world_base (T, 4, 4); base_twist (T, 6), [omega; v of the base
     origin], and base_acceleration (T, 6), its time derivative; the same for every foot by the name of its
     tip, at the tip's own origin: T_world_tip, tip_twist, tip_acceleration; hand_position, hand_velocity,
     hand_acceleration (T, 3) for every hand; contact (T, feet) bool for ``feet``; footholds: two of the
-    start, then one per step; boundaries (steps + 1,) [s]: when each step begins, and the last ends;
-    sole_gap: smallest distance between the soles seen from above [m]; notes: what the reader should know.
+    start, then one per step; terrain: what is supposed to be under them; boundaries (steps + 1,)
+    [s]: when each step begins, and the last ends; sole_gap: smallest distance between the soles seen along
+    the floor's normal [m]; notes: what the reader should know.
     """
 
     gait: Gait
@@ -54,6 +57,7 @@ class Plan:
     contact: NDArray[np.bool_]
     feet: tuple[str, ...]
     footholds: tuple[Foothold, ...]
+    terrain: Terrain
     boundaries: Array
     sole_gap: float
     notes: tuple[str, ...] = ()
@@ -123,7 +127,8 @@ def plan_around(
         notes: what the reader of the plan should know.
 
     Raises:
-        GaitError: a swing below the floor, or numbers too large. NoSolutionError: the feet overlap.
+        GaitError: a swing below the floor, or numbers too large. NoSolutionError: the feet overlap, or run
+            into the block of a foothold.
     """
     with np.errstate(all="ignore"):
         holds = footholds(gait, stance, steps)
@@ -132,6 +137,8 @@ def plan_around(
     _check_finite(gait, {"waist": waist, **feet, **hands})
     with np.errstate(all="ignore"):
         gap = check_soles(gait, stance, feet, time)
+        terrain = planned_terrain(gait, stance, holds)
+        check_edges(gait, stance, feet, time, terrain)
         base = carried_frame(waist, stance.T_waist_base)
     return Plan(
         gait=gait,
@@ -150,9 +157,10 @@ def plan_around(
         contact=_read_only(contact),
         feet=tuple(foot.name for foot in stance.feet),
         footholds=holds,
+        terrain=terrain,
         boundaries=_read_only(boundaries),
         sole_gap=gap,
-        notes=notes,
+        notes=notes if terrain.flat else (*notes, f"this walk supposes that {terrain}"),
     )
 
 

@@ -5,6 +5,10 @@ In the first ``dsp`` of a phase both feet are in contact, while the reference mo
 supporting sole. The CoM is that of all links. It has no fixed place in the waist, so Newton's method solves
 for the waist, for positions, rates and accelerations in turn. Source: Kajita et al. (2003); walking with the
 waist taken for the CoM (``com = "waist"``) is what the second paper does.
+
+Everything is in the floor's frame. On a slope gravity has a part along the floor: with the vertical n in the
+floor's axes the ZMP is p = c - z/(g n_z) c'' - z n_xy / n_z. On footholds of different heights the controller
+takes the CoM to stay as high above them as at the start; the ZMP of the walk itself is exact.
 """
 
 from __future__ import annotations
@@ -16,11 +20,12 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, pose_from_array, twist_from_array, unstack
 from screwkin.dynamics.newton_euler import Bodies, total_momentum
+from screwkin.dynamics.terrain import Terrain
 from screwkin.errors import Fault, GaitError, InputError, NoSolutionError
 from screwkin.gait.balance import ground_reaction
 from screwkin.gait.footsteps import Foothold, footholds, swing_side
-from screwkin.gait.motion import Motion, along
-from screwkin.gait.path import path_of
+from screwkin.gait.motion import Motion
+from screwkin.gait.over_feet import headings, levels, waist_over
 from screwkin.gait.plan import Plan, check_fitted, check_rate, plan_around, whole_steps
 from screwkin.gait.preview import CartMotion, follow_reference, preview_gains
 from screwkin.gait.realise import differentiate, positions
@@ -65,13 +70,14 @@ def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -
     time = np.arange(count) / gait.rate
     phase = _phase(time, gait.Tc, steps)
     holds = footholds(gait, stance, steps)
-    reference, heading = zmp_reference(gait, stance, holds, steps, time), headings(gait, holds, steps)
-
+    reference = zmp_reference(gait, stance, holds, steps, time)
+    heading, level = headings(gait, holds, steps), levels(holds)
     boundaries = gait.Tc * np.arange(1.0, steps + 2.0)
 
     def around(cart: CartMotion, part: slice = slice(None)) -> Plan:
         now = Motion(phase.value[part], phase.rate[part], phase.acceleration[part])
-        return plan_around(gait, stance, steps, time[part], now, _waist(gait, heading, cart, now), boundaries)
+        waist = waist_over(gait, heading, level, cart, now)
+        return plan_around(gait, stance, steps, time[part], now, waist, boundaries)
 
     height = gait.waist_height
     if gait.com == "true":
@@ -79,10 +85,12 @@ def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -
         standing = around(CartMotion(reference[:1], rest, rest, reference[:1]), slice(1))
         stand, q = _followed(mechanism, standing, reference[:1])
         height = _com(mechanism.robot, stand, q)[0, 2]
+    normal = Terrain(gait.uphill, gait.upleft).R[2]  # the vertical in the floor's axes
     gains = preview_gains(
-        1 / gait.rate, height, settings["horizon"], settings["Qe"], settings["Qx"], settings["R"]
+        1 / gait.rate, height / normal[2], settings["horizon"], settings["Qe"], settings["Qx"], settings["R"]
     )
-    cart = follow_reference(gains, reference)
+    # On a slope the CoM stands further uphill: above the foot, not along its normal.
+    cart = follow_reference(gains, reference + height / normal[2] * normal[:2])
     planned = around(cart)
     if gait.com == "waist":
         return replace(planned, notes=("the waist is taken for the CoM",))
@@ -90,7 +98,10 @@ def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -
 
 
 def zmp_reference(gait: Gait, stance: Stance, holds: tuple[Foothold, ...], steps: int, time: Array) -> Array:
-    """Wanted ZMP (T, 2): at rest between the feet, else in the middle of the supporting sole [m].
+    """Wanted ZMP (T, 2): at rest between the feet, else in the supporting sole [m].
+
+    There it goes from ``roll`` on the side that the other foot leaves to ``roll`` on the side where it lands,
+    about the middle and along the foot's x axis.
 
     Args:
         gait: of kind ``preview`` or ``footsteps``.
@@ -99,40 +110,35 @@ def zmp_reference(gait: Gait, stance: Stance, holds: tuple[Foothold, ...], steps
         steps: number of swings.
         time: (T,) [s].
     """
-    places = [0.5 * (_middle(stance, holds[0]) + _middle(stance, holds[1]))]
+    enter = [0.5 * (_middle(stance, holds[0]) + _middle(stance, holds[1]))]
+    leave = enter.copy()
     stand = {hold.foot: hold for hold in holds[:2]}
     for n in range(steps):
-        supporting = stance.foot(-swing_side(gait, n))
-        places.append(_middle(stance, stand[supporting.name]))
+        supporting = stand[stance.foot(-swing_side(gait, n)).name]
+        for ends, other in ((enter, stand[holds[n + 2].foot]), (leave, holds[n + 2])):
+            ends.append(_middle(stance, supporting, towards=other, by=gait.roll))
         stand[holds[n + 2].foot] = holds[n + 2]
     first, second = stand.values()
-    places.append(0.5 * (_middle(stance, first) + _middle(stance, second)))
+    for ends in (enter, leave):
+        ends.append(0.5 * (_middle(stance, first) + _middle(stance, second)))
     number = np.clip(np.floor(time / gait.Tc + 1e-9).astype(int), 0, steps + 1)
-    share = np.clip((time / gait.Tc - number) / gait.numbers["dsp"], 0.0, 1.0)[:, None]
-    levels = np.array([places[0], *places])
-    return np.asarray(levels[number] + share * (levels[number + 1] - levels[number]))
+    dsp, gone = gait.numbers["dsp"], (time / gait.Tc - number)[:, None]
+    before, at, after = (
+        np.array([leave[0], *leave[:-1]])[number],
+        np.array(enter)[number],
+        np.array(leave)[number],
+    )
+    rolled = np.clip((gone - dsp) / (1 - dsp), 0.0, 1.0) * (after - at)
+    return np.asarray(before + np.clip(gone / dsp, 0.0, 1.0) * (at - before) + rolled)
 
 
-def headings(gait: Gait, holds: tuple[Foothold, ...], steps: int) -> Array:
-    """Yaw of the waist at the boundaries of the steps (steps + 1,) [rad].
-
-    Along the path of the gait; over listed footholds the mean of those that the feet then stand on.
-    """
-    if not gait.places:
-        return np.arange(steps + 1.0) * path_of(gait).turn
-    stand = {hold.foot: hold.yaw for hold in holds[:2]}
-    means = [sum(stand.values()) / 2]
-    for hold in holds[2:]:
-        stand[hold.foot] = hold.yaw
-        means.append(sum(stand.values()) / 2)
-    return np.array(means)
-
-
-def _middle(stance: Stance, hold: Foothold) -> Array:
-    """The middle of a sole on its foothold, seen from above [m]."""
+def _middle(stance: Stance, hold: Foothold, towards: Foothold | None = None, by: float = 0.0) -> Array:
+    """The middle of a sole on its foothold, or ``by`` along its x axis towards another [m]."""
     outlines = {foot.name: foot.sole for foot in stance.feet}
     x, y = np.mean(outlines[hold.foot], axis=0)
     c, s = np.cos(hold.yaw), np.sin(hold.yaw)
+    if towards is not None:
+        x += float(np.clip(c * (towards.x - hold.x) + s * (towards.y - hold.y), -by, by))
     return np.array([hold.x + c * x - s * y, hold.y + s * x + c * y])
 
 
@@ -170,28 +176,6 @@ def _phase(time: Array, Tc: float, steps: int) -> Motion:
     value = np.clip(time / Tc - 1, 0.0, float(steps))
     moving = (value > 0) & (value < steps)
     return Motion(value, np.where(moving, 1 / Tc, 0.0), np.zeros_like(time))
-
-
-def _waist(gait: Gait, heading: Array, cart: CartMotion, phase: Motion) -> Motion:
-    """Waist x, y, z, yaw (T, 4): over the cart, turned to the next heading by a quintic in each step."""
-
-    def turned(p: Array, order: int) -> Array:
-        n = np.minimum(np.floor(p), len(heading) - 2).astype(int)
-        u, by = p - n, np.diff(heading)[n]
-        if order == 0:
-            return np.asarray(heading[n] + by * u**3 * (10 + u * (6 * u - 15)))
-        return by * (30 * (u * (1 - u)) ** 2 if order == 1 else 60 * u * (1 - u) * (1 - 2 * u))
-
-    turning = along(turned, phase)
-    columns = [
-        np.column_stack([flat, np.full(len(flat), height), yaw])
-        for flat, height, yaw in (
-            (cart.com, gait.waist_height, turning.value),
-            (cart.velocity, 0.0, turning.rate),
-            (cart.acceleration, 0.0, turning.acceleration),
-        )
-    ]
-    return Motion(*columns)
 
 
 def _com(robot: Robot, planned: Plan, q: Array) -> Array:

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal, cast
 
+from screwkin.dynamics.terrain import STEEPEST
 from screwkin.errors import Fault, GaitError, near
 from screwkin.gait.free_path import read_free_waist
 from screwkin.gait.keypoints import CHANNELS, Channel, channel_faults, increases, read_channel
@@ -53,7 +54,10 @@ NUMBERS: Mapping[str, float | None] = {
 }
 """Parameters that are numbers, with their defaults; None: the file must say it."""
 
-FLAT = (*TEXTS, *CHOICES, *NUMBERS)
+OPTIONAL: Mapping[str, float] = {"uphill": 0.0, "upleft": 0.0, "roll": 0.0}
+"""Further numbers, with their defaults; a gait records those only that are given."""
+
+FLAT = (*TEXTS, *CHOICES, *NUMBERS, *OPTIONAL)
 """Every key of the table ``[gait]``."""
 
 _POSITIVE = ("Tc", "lift", "waist_height", "hand_drop", "rate")
@@ -70,7 +74,9 @@ class Gait:
     below their shoulders. sway: factor on the lateral motion of the waist. spread: added to each foot's
     distance from the middle. ramp: steps over which the gait starts and stops (0: at once). steps: how many,
     by default. rate: samples per second. arms: ``follow`` their hands, or ``rest``
-    at home. footholds: ``alternate`` (each foot passes the other),
+    at home. uphill, upleft: angles by which the floor rises ahead, along x, and then to the left. roll: how
+    far the wanted ZMP goes from the middle of a sole to where the other foot leaves, then to where it lands.
+    footholds: ``alternate`` (each foot passes the other),
     ``close`` (one leads, the other closes up) or ``parallel`` (as alternate, but from feet side by side to
     feet side by side); first: the foot that swings first. com: what a preview gait steers, the ``true`` CoM
     of all links or, naively, the ``waist``.
@@ -106,6 +112,9 @@ class Gait:
     waist: Mapping[str, tuple[float, ...]]
     lengths: Mapping[str, float] = field(default_factory=dict)
     places: tuple[StepEnd, ...] = ()
+    uphill: float = 0.0
+    upleft: float = 0.0
+    roll: float = 0.0
     path: str = ""
     _document: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
@@ -124,7 +133,9 @@ class Gait:
     def unfitted(self) -> tuple[str, ...]:
         """Keys whose numbers depend on lengths of a robot that is not known yet; ``fitted`` knows it."""
         channels = [f"channel.{c.name}" for c in self.channels.values() if math.isnan(c.at[0] + c.value[0])]
-        holds = [f"foothold {i + 1}" for i, p in enumerate(self.places) if math.isnan(p.x + p.y + p.yaw)]
+        holds = [
+            f"foothold {i + 1}" for i, p in enumerate(self.places) if math.isnan(p.x + p.y + p.yaw + p.z)
+        ]
         return (*(key for key, value in self.numbers.items() if math.isnan(value)), *channels, *holds)
 
     def replace(self, **parameters: Any) -> Gait:
@@ -139,8 +150,8 @@ class Gait:
         document = self.to_dict()
         faults = []
         for key, value in parameters.items():
-            if not place(document, key, value):
-                valid = valid_keys(document)
+            if not place(document, key, value, OPTIONAL):
+                valid = valid_keys(document, OPTIONAL)
                 fix = f"{near(key, valid)}Valid: {', '.join(valid)}; one entry of a list by its number: KEY.0"
                 faults.append(Fault("", key, "no such parameter", fix))
         where = self.path or f"gait {self.name}"
@@ -173,6 +184,10 @@ def gait_from_dict(document: Mapping[str, Any], path: str = "<gait>") -> Gait:
     waist = read_free_waist(tables["waist"], faults)
     _check_complete(flat["kind"], channels, waist, tables["channel"], faults)
     open_ = frozenset() if lengths else relative_to_robot(_raw_numbers(flat, tables["parameters"]))
+    for key in OPTIONAL:
+        if flat["kind"] == "geometric" and numbers.get(key):
+            found = "key points alone lead the waist of a gait of kind 'geometric'"
+            faults.append(Fault("[gait]", key, found, 'Take a gait of kind "preview" or "footsteps"'))
     places = _places(document, flat, numbers, open_, faults)
     if faults:
         raise GaitError(path, faults)
@@ -180,8 +195,9 @@ def gait_from_dict(document: Mapping[str, Any], path: str = "<gait>") -> Gait:
     if not lengths:
         values |= dict.fromkeys(open_ & {*values}, math.nan)
         channels = {name: _without_numbers(c, tables["channel"][name], open_) for name, c in channels.items()}
+    given = {name: values[name] for name in (*NUMBERS, *OPTIONAL) if name in values}
     return Gait(
-        **flat | {name: values[name] for name in NUMBERS} | {"steps": int(values["steps"])},
+        **flat | given | {"steps": int(values["steps"])},
         numbers=values,
         channels=channels,
         waist=waist,
@@ -257,11 +273,11 @@ def _flat(table: Mapping[str, Any], faults: list[Fault]) -> dict[str, Any]:
             flat[key] = table.get(key, default)
         else:
             faults.append(Fault(row, key, "missing", "Give a number"))
-    return flat
+    return flat | {key: table[key] for key in OPTIONAL if key in table}
 
 
 def _raw_numbers(flat: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: flat[key] for key in NUMBERS if key in flat} | {
+    return {key: flat[key] for key in (*NUMBERS, *OPTIONAL) if key in flat} | {
         key: value for key, value in own.items() if key not in FLAT
     }
 
@@ -297,13 +313,22 @@ def _numbers(
         if key in relative
     ]
     values, wrong = resolve_parameters(raw | dict(lengths or NOMINAL), row="[gait]")
-    faults += [fault if fault.key in NUMBERS else _moved(fault, "[parameters]") for fault in wrong]
+    faults += [
+        fault if fault.key in (*NUMBERS, *OPTIONAL) else _moved(fault, "[parameters]") for fault in wrong
+    ]
     numbers = {name: None if value is None else float(value) for name, value in values.items()}
-    for key in (*_POSITIVE, "ramp"):
-        value, least = numbers.get(key), "at least 0" if key == "ramp" else "above 0"
+    for key in (*_POSITIVE, "ramp", "roll"):
+        value, least = numbers.get(key), "above 0" if key in _POSITIVE else "at least 0"
         known = lengths or key not in relative
-        if known and value is not None and (value < 0 or (value == 0 and key != "ramp")):
+        if known and value is not None and (value < 0 or (value == 0 and key in _POSITIVE)):
             faults.append(Fault("[gait]", key, f"{value:g} is not {least}", f"Give a number {least}"))
+            numbers[key] = None
+    for key in ("uphill", "upleft"):
+        value = numbers.get(key)
+        if value is not None and abs(value) > STEEPEST:
+            found = f"{value:g} rad is {math.degrees(value):.3g} deg"
+            fix = f"A floor slopes by {math.degrees(STEEPEST):g} deg at most"
+            faults.append(Fault("[gait]", key, found, fix))
             numbers[key] = None
     steps = numbers.get("steps")
     if steps is not None and (steps < 1 or steps != round(steps)):

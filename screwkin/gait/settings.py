@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,15 +10,15 @@ import numpy as np
 _LISTS = {"channel": 2, "waist": 1}  # tables of lists, and how many names lead to a list
 
 
-def valid_keys(document: Mapping[str, Any]) -> list[str]:
+def valid_keys(document: Mapping[str, Any], optional: Iterable[str] = ()) -> list[str]:
     """Keys that may be set: flat parameters, the file's own ones, then its lists of numbers."""
-    keys = [*document["gait"], *document["parameters"]]
+    keys = [*dict.fromkeys([*document["gait"], *optional, *document["parameters"]])]
     keys += [f"channel.{name}.{part}" for name in document["channel"] for part in ("at", "value")]
     return keys + [f"waist.{name}" for name in document["waist"]]
 
 
-def place(document: dict[str, Any], key: str, value: Any) -> bool:
-    """Set a value in the document, in place; False if the key names nothing in it.
+def place(document: dict[str, Any], key: str, value: Any, optional: Iterable[str] = ()) -> bool:
+    """Set a value in the document, in place; False if the key names nothing in it, nor is optional.
 
     Keys: a parameter; ``channel.NAME.at`` or ``.value`` and ``waist.NAME``, with a list or its text
     ``"[0, lift/2, lift]"``; or one entry of such a list, by its number from 0: ``channel.NAME.value.2``.
@@ -29,6 +29,9 @@ def place(document: dict[str, Any], key: str, value: Any) -> bool:
         if key in document[table]:
             document[table][key] = value
             return True
+    if key in optional:
+        document["gait"][key] = value
+        return True
     first, *names = key.split(".")
     depth = _LISTS.get(first, 0)
     if not depth or len(names) not in (depth, depth + 1):

@@ -89,7 +89,7 @@ def planned_walk(robot: Robot, gait: Gait, steps: int, command: str = "") -> Tra
     zmp, com, wrench, _ = ground_reaction(
         robot, planned.T_world_base, q, qd, qdd, planned.base_twist, planned.base_acceleration
     )
-    soles = soles_on_floor(robot, planned.feet, tip_poses)
+    soles = soles_on_floor(robot, planned.feet, tip_poses, planned.terrain, wrench)
     return Trajectory(
         time=planned.time,
         joint_names=robot.joint_names,
@@ -119,6 +119,7 @@ def planned_walk(robot: Robot, gait: Gait, steps: int, command: str = "") -> Tra
             "sigma": done.sigma,
             "notes": [*planned.notes, *drive.notes, *done.notes, *_deviations(done, tip_poses)],
             **({"at_rest": list(drive.at_rest)} if drive.at_rest else {}),
+            **({} if planned.terrain.flat else {"terrain": planned.terrain.to_dict()}),
             "versions": versions(*TRACED),
             "command": command,
         },

@@ -10,6 +10,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.analysis.account import Account
 from screwkin.dynamics.support import Spike, convex_hull
 from screwkin.gait.balance import soles_on_floor
+from screwkin.gait.ground import ground_of
 from screwkin.mechanism.singularity import NEAR
 from screwkin.report.style import (
     GCOM,
@@ -33,10 +34,17 @@ _AXES = ("x", "y")
 _APART = 0.018  # of the duration: labels of spikes nearer than that would overlap
 
 
+def placed_soles(account: Account) -> Array:
+    """Corners (T, feet, corners, 2) of soles, carried along the ground's force onto z = 0 [m]."""
+    trajectory = account.trajectory
+    terrain, wrench = ground_of(trajectory), account.balance.wrench
+    return soles_on_floor(account.robot, trajectory.feet, trajectory.T_world_tip, terrain, wrench)
+
+
 def support_polygons(account: Account) -> list[tuple[int, int, Array]]:
     """First and last sample of every phase of support, and the corners (k, 2) of its polygon [m]."""
     trajectory = account.trajectory
-    soles = soles_on_floor(account.robot, trajectory.feet, trajectory.T_world_tip)
+    soles = placed_soles(account)
     contact = trajectory.contact
     changed = np.flatnonzero((contact[1:] != contact[:-1]).any(axis=1)) + 1
     starts = [0, *changed.tolist()]
@@ -138,8 +146,7 @@ def _label_spikes(axes: Axes, spikes: Sequence[Spike], time: Array, value: Array
 
 def seen_from_above(account: Account) -> Figure:
     """Soles where they stand, support polygons, and the paths of GCoM and ZMP."""
-    trajectory, balance = account.trajectory, account.balance
-    soles = soles_on_floor(account.robot, trajectory.feet, trajectory.T_world_tip)
+    balance, soles = account.balance, placed_soles(account)
     everything = np.concatenate([soles.reshape(-1, 2), balance.zmp, balance.com[:, :2]])
     size = np.ptp(everything, axis=0)
     figure, axes = new_figure(1.0 + float(np.clip(8.0 * size[1] / size[0], 1.2, 5.5)))

@@ -10,6 +10,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, pose_from_array, unstack
 from screwkin.analysis.account import Account
 from screwkin.dynamics.support import convex_hull
+from screwkin.gait.ground import ground_of
 from screwkin.kinematics.positions import link_displacements
 from screwkin.model.robot import Robot
 from screwkin.model.shapes import box_points, link_points
@@ -38,7 +39,14 @@ def frames_of_run(account: Account, run: Run) -> Figure:
     if run.time[-1] < wanted[-1]:
         wanted = np.linspace(account.trajectory.time[0], run.time[-1], len(wanted))
     rows = np.clip(np.searchsorted(run.time, wanted - 1e-9), 0, len(run.time) - 1)
-    shots = pictures(account.robot, run.time[rows], run.T_world_base[rows], run.q[rows], Camera())
+    shots = pictures(
+        account.robot,
+        run.time[rows],
+        run.T_world_base[rows],
+        run.q[rows],
+        Camera(),
+        ground_of(account.trajectory),
+    )
     figure, axes = new_figure(4.9, ROWS, COLUMNS, squeeze=False)
     for one, time, shot in zip(axes.flat, run.time[rows], shots, strict=True):
         one.set_axis_off()

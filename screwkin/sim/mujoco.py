@@ -20,6 +20,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array
+from screwkin.dynamics.terrain import FLAT, Terrain
 from screwkin.errors import InputError, needed_for
 from screwkin.kinematics.positions import tree_positions
 from screwkin.model.inertias import impossible
@@ -29,6 +30,7 @@ from screwkin.sim.backend import Command, Contact, Observation, moment_about_ori
 from screwkin.sim.bodies import SimBody, bodies_of
 from screwkin.sim.couplings import STIFF, couple_in_mujoco
 from screwkin.sim.drive import UNLIMITED, RigidServos, Servos, motored
+from screwkin.sim.floor import floor_in_mujoco
 from screwkin.sim.loops import close_in_mujoco
 
 CORNER = 1e-4
@@ -62,7 +64,7 @@ class MuJoCoPhysics:
 
 
 class MuJoCoBackend:
-    """One robot on a flat floor."""
+    """One robot on its terrain."""
 
     name = "mujoco"
 
@@ -72,6 +74,7 @@ class MuJoCoBackend:
         physics: MuJoCoPhysics | None = None,
         gui: bool = False,
         servos: Servos | None = None,
+        terrain: Terrain = FLAT,
     ) -> None:
         """Build the world.
 
@@ -80,6 +83,7 @@ class MuJoCoBackend:
             physics: see ``MuJoCoPhysics``.
             gui: show a window.
             servos: of the joints; rigid by default.
+            terrain: to stand on.
 
         Raises:
             MissingDependencyError: mujoco is not installed.
@@ -98,7 +102,7 @@ class MuJoCoBackend:
             **asdict(self._physics),
             "remarks": [*remarks, *(f"inertia balanced of {name}" for name in _unbalanced(robot))],
         }
-        spec = _world(mj, self._physics)
+        spec = _world(mj, self._physics, terrain)
         _add_bodies(mj, spec, robot, bodies, self._servos.rotor_inertia * self._motored)
         ends = {body.link.name: (spec.body(_body_name(body.link.name)), body) for body in bodies}
         close_in_mujoco(mj, spec, robot, ends)
@@ -226,7 +230,7 @@ class MuJoCoBackend:
             self._window = None
 
 
-def _world(mj: Any, physics: MuJoCoPhysics) -> Any:
+def _world(mj: Any, physics: MuJoCoPhysics, terrain: Terrain) -> Any:
     """A floor, gravity and the solver's settings."""
     spec = mj.MjSpec()
     spec.compiler.degree = False
@@ -240,10 +244,10 @@ def _world(mj: Any, physics: MuJoCoPhysics) -> Any:
     spec.option.cone = getattr(mj.mjtCone, f"mjCONE_{physics.cone.upper()}")
     spec.option.impratio = physics.impratio
     # The larger coefficient of the two bodies counts: the floor takes the wanted friction, the robot none.
-    spec.worldbody.add_geom(
-        name="floor",
-        type=mj.mjtGeom.mjGEOM_PLANE,
-        size=[0.0, 0.0, 1.0],
+    floor_in_mujoco(
+        mj,
+        spec,
+        terrain,
         contype=1,
         conaffinity=0,
         friction=[physics.friction, 0.0, 0.0],

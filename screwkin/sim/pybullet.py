@@ -21,6 +21,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array
+from screwkin.dynamics.terrain import FLAT, Terrain
 from screwkin.errors import InputError, MissingDependencyError
 from screwkin.kinematics.positions import tree_positions
 from screwkin.model.robot import Limb, Robot
@@ -30,6 +31,7 @@ from screwkin.sim.backend import Command, Contact, Observation, moment_about_ori
 from screwkin.sim.camera import Camera
 from screwkin.sim.couplings import couple_in_pybullet
 from screwkin.sim.drive import UNLIMITED, RigidServos, Servos, motored
+from screwkin.sim.floor import floor_in_pybullet
 from screwkin.sim.loops import close_in_pybullet, quat_xyzw
 from screwkin.sim.motors import MotorServos
 from screwkin.sim.quiet import quiet
@@ -79,7 +81,7 @@ class _Foot:
 
 
 class PyBulletBackend:
-    """One robot on a flat floor in a physics client of its own."""
+    """One robot on its terrain in a physics client of its own."""
 
     name = "pybullet"
 
@@ -89,6 +91,7 @@ class PyBulletBackend:
         physics: Physics | None = None,
         gui: bool = False,
         servos: Servos | None = None,
+        terrain: Terrain = FLAT,
     ) -> None:
         """Connect and build the world.
 
@@ -97,6 +100,7 @@ class PyBulletBackend:
             physics: see ``Physics``.
             gui: show a window.
             servos: of the joints; rigid by default.
+            terrain: to stand on.
 
         Raises:
             MissingDependencyError: pybullet is not installed.
@@ -123,7 +127,7 @@ class PyBulletBackend:
         self._here = {"physicsClientId": self._client}
         self._steps = 0
         self._began = time.monotonic() if gui else None
-        self._floor = self._make_floor()
+        self._floor = self._make_floor(terrain)
         self._body = self._load(urdf)
         self._link_names = [robot.base_link, *(info[12].decode() for info in self._joint_infos())]
         names = [info[1].decode() for info in self._joint_infos()]
@@ -144,7 +148,7 @@ class PyBulletBackend:
         self._feet = [self._foot(limb) for limb in robot.limbs if limb.kind == "leg"]
         self._soften_soles()
 
-    def _make_floor(self) -> int:
+    def _make_floor(self, terrain: Terrain) -> tuple[int, ...]:
         p, here, physics = self._p, self._here, self._physics
         p.setGravity(0.0, 0.0, -physics.gravity, **here)
         p.setPhysicsEngineParameter(
@@ -162,10 +166,7 @@ class PyBulletBackend:
                     globalCFM=physics.regularisation,
                     **here,
                 )
-        floor: int = p.createMultiBody(0.0, p.createCollisionShape(p.GEOM_PLANE, **here), **here)
-        # The coefficients of the two bodies are multiplied: the floor takes 1, the robot the wanted friction.
-        p.changeDynamics(floor, -1, lateralFriction=1.0, frictionAnchor=1, **here)
-        return floor
+        return floor_in_pybullet(p, here, terrain)
 
     def _load(self, urdf: str) -> int:
         p = self._p
@@ -324,7 +325,7 @@ class PyBulletBackend:
 
     def _contacts(self) -> Iterator[Contact]:
         """Points where the floor presses on the robot; the force includes friction."""
-        for touch in self._p.getContactPoints(self._body, self._floor, **self._here):
+        for touch in sum((self._p.getContactPoints(self._body, b, **self._here) for b in self._floor), ()):
             normal, pressing = touch[7], touch[9]
             if pressing <= 0.0:
                 continue

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import IDENTITY, as_array, unstack
 from screwkin.dynamics.support import convex_hull
+from screwkin.dynamics.terrain import FLAT, Terrain
 from screwkin.kinematics.positions import link_displacements
 from screwkin.model.robot import Robot
 from screwkin.sim.camera import Camera, Picture, View, following, view_of
-from screwkin.sim.solids import Part, Solids, solids_of
+from screwkin.sim.solids import Part, Solids, solids_of, with_blocks
 from screwkin.sim.triangles import draw_triangles
 
 FINER = 2
@@ -34,10 +35,13 @@ _CELL = 1 / 200  # of the camera's distance: what meshes are coarsened to, two p
 _FACES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 
 
-def pictures(robot: Robot, time: Array, T_world_base: Array, q: Array, camera: Camera) -> list[Picture]:
+def pictures(
+    robot: Robot, time: Array, T_world_base: Array, q: Array, camera: Camera, terrain: Terrain = FLAT
+) -> list[Picture]:
     """Pictures (height, width, 3) of K states, the camera gliding along.
 
-    Links show their shapes; without any that can be read their boxes, and without these nothing.
+    Links show their shapes; without any that can be read their boxes, and without these nothing. On a slope
+    the camera is tilted with the floor.
 
     Args:
         robot: of numbers.
@@ -45,14 +49,19 @@ def pictures(robot: Robot, time: Array, T_world_base: Array, q: Array, camera: C
         T_world_base: (K, 4, 4).
         q: (K, n).
         camera: see ``Camera``.
+        terrain: what the robot stands on.
     """
+    if not terrain.flat:
+        T_world_base = np.linalg.inv(terrain.T_world_plane) @ T_world_base
     carried = link_displacements(robot, unstack(np.asarray(q, dtype=float)))
     displacements = T_world_base[:, None] @ np.moveaxis(as_array([D @ IDENTITY for D in carried]), -3, -3)
     targets = following(time, T_world_base)
     away = camera.distance * float(T_world_base[0, 2, 3])
-    solids = solids_of(robot, _CELL * away)
+    solids = with_blocks(solids_of(robot, _CELL * away), terrain)
+    still = np.eye(4)[None]  # what carries the blocks, behind the last link
     return [
-        _picture(camera, target, away, solids, Ts) for target, Ts in zip(targets, displacements, strict=True)
+        _picture(camera, target, away, solids, np.concatenate([Ts, still]))
+        for target, Ts in zip(targets, displacements, strict=True)
     ]
 
 

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array
+from screwkin.dynamics.terrain import Terrain
+from screwkin.gait.ground import ground_of
 from screwkin.mechanism.holds import on_floor
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
@@ -21,8 +23,8 @@ class Schedule:
     """How a trajectory is played.
 
     settle: standing at the first sample before it starts [s]; hold: standing at the last one after its end
-    [s]; fallen_tilt [rad] and fallen_height (share of the planned height of the base): beyond these the robot
-    has fallen; aftermath: how long the fall is watched [s].
+    [s]; fallen_tilt [rad] and fallen_height (share of the planned height of the base above the floor): beyond
+    these the robot has fallen; aftermath: how long the fall is watched [s].
     """
 
     settle: float = 0.5
@@ -95,6 +97,7 @@ def simulate(
     dt, since = backend.dt, float(trajectory.time[0])
     count = round((rule.settle + trajectory.duration + rule.hold) / dt)
     times: Array = since - rule.settle + dt * np.arange(count + 1, dtype=np.float64)
+    terrain = ground_of(trajectory)
     q, _ = trajectory.sampled(times)
     planned = trajectory.base_sampled(times)
     qd = np.diff(q, axis=0) / dt
@@ -107,7 +110,7 @@ def simulate(
         now = float(times[k + 1])
         if progress is not None and k % 100 == 99:
             progress((k + 1) / count)
-        if fallen_at is None and _has_fallen(seen[-1].T_world_base, planned[k + 1], rule):
+        if fallen_at is None and _has_fallen(seen[-1].T_world_base, planned[k + 1], rule, terrain):
             fallen_at = now
         if fallen_at is not None and now > fallen_at + rule.aftermath - dt / 2:
             break
@@ -158,5 +161,6 @@ def _tilt(T: Array) -> Array:
     return np.asarray(np.arctan2(np.hypot(T[..., 0, 2], T[..., 1, 2]), T[..., 2, 2]))
 
 
-def _has_fallen(T: Array, planned: Array, rule: Schedule) -> bool:
-    return bool(_tilt(T) > rule.fallen_tilt or T[2, 3] < rule.fallen_height * planned[2, 3])
+def _has_fallen(T: Array, planned: Array, rule: Schedule, terrain: Terrain) -> bool:
+    height, wanted = terrain.above_plane(np.stack([T[:3, 3], planned[:3, 3]]))
+    return bool(_tilt(T) > rule.fallen_tilt or height < rule.fallen_height * wanted)

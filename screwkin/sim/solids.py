@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
+from screwkin.dynamics.terrain import Terrain
 from screwkin.errors import InputError, MissingDependencyError, RobotRemark
 from screwkin.model.records import Link
 from screwkin.model.robot import Robot
 from screwkin.model.shapes import box_points, honours_up, shape_triangles
 from screwkin.model.urdf import link_colours
+
+STONE = (0.62, 0.60, 0.56)
+"""Colour of blocks on the floor."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +67,26 @@ def solids_of(robot: Robot, cell: float) -> Solids:
         more = f", and {len(others)} more files" if others else ""
         warnings.warn(f"{robot.name}: not in pictures: {first}{more}", RobotRemark, stacklevel=3)
     return Solids(_part(boxes, 8), _part(triangles, 3))
+
+
+def with_blocks(solids: Solids, terrain: Terrain) -> Solids:
+    """The solids with the blocks of a terrain among the boxes, in the plane's frame, as link -1."""
+    if not terrain.blocks:
+        return solids
+    back = np.linalg.inv(terrain.T_world_plane)
+    corners = np.array([(back @ pose @ _box(edges))[:3].T for pose, edges in terrain.boxes()])
+    corners[..., 2] = corners[..., 2].clip(0.0)
+    own = solids.boxes
+    links = np.full(len(corners), -1)
+    colours = np.tile(STONE, (len(corners), 1))
+    joined = zip((own.links, own.corners, own.colours), (links, corners, colours), strict=True)
+    return replace(solids, boxes=Part(*(np.concatenate(pair) for pair in joined)))
+
+
+def _box(edges: Array) -> Array:
+    """Corners (4, 8) of a box about the origin, homogeneous, in the order of ``box_points``."""
+    signs = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)]) / 2
+    return np.vstack([(signs * edges).T, np.ones(8)])
 
 
 def _triangles(link: Link, upright: bool, cell: float, unread: dict[str, None]) -> list[tuple[Array, Array]]:

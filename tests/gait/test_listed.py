@@ -147,7 +147,8 @@ def test_a_file_of_footsteps_is_read_with_formulas_and_feet(tmp_path: Path) -> N
     [
         ("", "row 1, key x: missing column"),
         ("x,y\n0,0\n", "row 1, key yaw: missing column"),
-        ("x,y,yaw,z\n0,0,0,0\n", "row 1, key z: unknown column"),
+        ("x,y,yaw,w\n0,0,0,0\n", "row 1, key w: unknown column"),
+        ("x,y,yaw,z\n0,0,0,high\n", r"\[\[foothold\]\] 1, key z"),
         ("x,y,yaw\n0,0\n", "row 2: 2 cells for 3 columns"),
         ("x,y,yaw\n0,zero,0\n", r"\[\[foothold\]\] 1, key y"),
         ("foot,x,y,yaw\nleft,0,0,0\n\nleft,0,0,0\n", "row 4, key foot: 'left' where the right foot swings"),

@@ -96,6 +96,24 @@ def test_the_face_of_the_foot_that_bears_decides_whether_the_naive_plan_keeps_in
     assert narrower == pytest.approx(least - 0.0065, abs=1e-9)
 
 
+@pytest.mark.parametrize("roll", [0.0, 0.02])
+def test_the_wanted_zmp_rolls_over_each_sole_from_where_the_other_foot_leaves_to_where_it_lands(
+    roll: float,
+) -> None:
+    gait = sk.load_gait("preview").replace(roll=roll)
+    stance, steps = stance_of(sk.load_robot("bioloid")), 4
+    holds = footholds(gait, stance, steps)
+    time = np.arange(0, (steps + 2) * gait.Tc, 0.01)
+    wanted = zmp_reference(gait, stance, holds, steps, time)
+    assert np.abs(np.diff(wanted, axis=0)).max() < 0.01  # without a jump
+    stood = holds[3]  # the left foot, on which the robot stands while the right one makes its second step
+    single = (time > 3 * gait.Tc + 0.2 * gait.Tc + 1e-9) & (time < 4 * gait.Tc - 1e-9)
+    at = wanted[single] - [stood.x, stood.y]
+    np.testing.assert_allclose(at[:, 1], 0.0, atol=1e-12)
+    np.testing.assert_allclose(at[[0, -1], 0], [-roll, roll], atol=6e-4)
+    assert (np.diff(at[:, 0]) >= -1e-12).all()
+
+
 def test_feet_may_not_overlap_even_where_their_soles_do_not(robot: sk.Robot, gait: sk.Gait) -> None:
     """Feet of 63 mm touch 31.5 mm from the middle; what bears is 50 mm wide."""
     with pytest.raises(NoSolutionError, match=r"left_foot and right_foot overlap .* by up to 1\.0 mm"):
