@@ -1,9 +1,9 @@
-"""python -m benchmarks.verdicts [--only WORDS] [--limit N] [--jobs N] [-o DIR]: verdicts of both engines.
+"""python -m benchmarks.verdicts [--only WORDS] [--limit N] [--jobs N] [--so-far] [-o DIR]: both engines.
 
 Every walk of ``walks.csv`` is planned and validated in PyBullet and MuJoCo, with rigid servos and with those
 of the robot's table. The result says where the verdicts of the engines differ, and by which criteria. Every
 finished walk is appended to ``verdicts.jsonl`` in DIR; a run that ends early goes on from there, and the file
-is removed with the last walk of the list.
+is removed with the last walk of the list. With ``--so-far`` none is run: the result is of the finished ones.
 """
 
 from __future__ import annotations
@@ -115,7 +115,12 @@ def pairs(rows: Iterable[Outcome], servo: str) -> dict[Walk, dict[str, Outcome]]
 def markdown(rows: Sequence[Outcome]) -> str:
     """Counts, and every walk on which the engines differ, with the reasons."""
     lines = ["# Verdicts of two engines", "", _machine(), ""]
-    lines += [f"Walks of {STEPS} steps of `benchmarks/walks.csv`; `python -m benchmarks.verdicts`.", ""]
+    count = len({row.walk for row in rows})
+    lines += [
+        f"{count} walks of {STEPS} steps of the {len(walks())} in `benchmarks/walks.csv`; "
+        "`python -m benchmarks.verdicts`.",
+        "",
+    ]
     lines += [
         "| servos | walks | verdicts agree | pass in both | fail in both |",
         "|---|---:|---:|---:|---:|",
@@ -140,12 +145,13 @@ def markdown(rows: Sequence[Outcome]) -> str:
             ]
             lines[-1] += f"largest RMS of the contact ZMP against the plan {max(rms):.2f} mm."
     lines += ["", "## Where they differ", ""]
+    differing = []
     for servo in SERVOS:
         for walk, pair in pairs(rows, servo).items():
             if len({o.passed for o in pair.values()}) > 1:
                 reasons = "; ".join(f"{e}: {', '.join(o.reasons) or 'passes'}" for e, o in pair.items())
-                lines.append(f"- {walk.title}, servos {servo}. {reasons}")
-    return "\n".join(lines) + "\n"
+                differing.append(f"- {walk.title}, servos {servo}. {reasons}")
+    return "\n".join([*lines, *(differing or ["Nowhere."])]) + "\n"
 
 
 def _machine() -> str:
@@ -162,6 +168,7 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("--limit", type=int, help="so many walks, spread over the list")
     parser.add_argument("--jobs", type=int, default=1, help="processes side by side")
+    parser.add_argument("--so-far", action="store_true", help="no walk: only the result of finished ones")
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "results")
     asked = parser.parse_args(arguments)
     pin_threads()
@@ -172,7 +179,7 @@ def main(arguments: list[str] | None = None) -> int:
     asked.output.mkdir(parents=True, exist_ok=True)
     finished = asked.output / "verdicts.jsonl"
     rows = [row for row in done(finished) if row.walk in wanted]
-    left = [walk for walk in wanted if walk not in {row.walk for row in rows}]
+    left = [] if asked.so_far else [walk for walk in wanted if walk not in {row.walk for row in rows}]
     Random(0).shuffle(left)  # whatever part is done is of all kinds
     with ProcessPoolExecutor(asked.jobs) as pool, finished.open("a", encoding="utf-8") as file:
         for k, job in enumerate(as_completed([pool.submit(outcomes, walk) for walk in left])):
@@ -183,7 +190,8 @@ def main(arguments: list[str] | None = None) -> int:
     rows.sort(key=lambda row: (wanted.index(row.walk), SERVOS.index(row.servo), ENGINES.index(row.engine)))
     (asked.output / "verdicts.json").write_text(json.dumps([asdict(row) for row in rows], indent=1) + "\n")
     (asked.output / "verdicts.md").write_text(markdown(rows))
-    finished.unlink()
+    if not asked.so_far:
+        finished.unlink()
     print(markdown(rows))
     return 0
 

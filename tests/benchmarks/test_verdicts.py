@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, replace
+from itertools import product
 from pathlib import Path
 
 import screwkin as sk
-from benchmarks.verdicts import Outcome, Walk, done, markdown, walks
+from benchmarks.verdicts import ENGINES, SERVOS, Outcome, Walk, done, main, markdown, walks
 
 
 def test_the_list_holds_a_hundred_different_walks_of_three_robots() -> None:
@@ -41,3 +42,14 @@ def test_a_run_that_ended_early_goes_on_from_its_last_finished_walk(tmp_path: Pa
     assert done(file) == []
     file.write_text(json.dumps([asdict(row)]) + '\n[{"walk": {"rob')
     assert done(file) == [row]
+
+
+def test_the_result_of_what_is_finished_runs_no_walk(tmp_path: Path) -> None:
+    walk = walks()[0]
+    rows = [Outcome(walk, servo, engine, True, (), 0.1, 0.1) for servo, engine in product(SERVOS, ENGINES)]
+    file = tmp_path / "verdicts.jsonl"
+    file.write_text(json.dumps([asdict(row) for row in rows]))
+    assert main(["--so-far", "-o", str(tmp_path)]) == 0
+    assert "1 walks of 4 steps of the 100 in" in (tmp_path / "verdicts.md").read_text()
+    assert len(json.loads((tmp_path / "verdicts.json").read_text())) == 4
+    assert done(file) == rows
