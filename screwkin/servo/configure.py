@@ -138,30 +138,33 @@ def refuse_torque(bus: Bus, bounds: Bounds) -> None:
 def write_changes(bus: Bus, profile: Profile, changes: Sequence[Change]) -> None:
     """Write registers of one servo, and read each back; again where one changed another.
 
+    Where a model forgets what was written under its lock, the lock is open meanwhile, and read back too.
+
     Raises:
         NoSolutionError: a register does not become what was written. LineLostError: the port is gone.
     """
+    if not changes:
+        return
     last = [one for one in changes if one.register.name == "status_level" and not any(one.after)]
     rest = [one for one in changes if one not in last]
     rest.sort(key=lambda one: one.register.name not in FIRST)
-    lock = profile.registers.get("lock")
-    unlocks = lock is not None and lock.initial == 1 and changes
-    if unlocks and lock:
-        _put(bus, changes[0].id, lock, b"\0")
-    for _ in range(_PASSES):
-        left = [one for one in rest if _held(bus, one) != one.after]
+    lock = profile.register("lock") if profile.unlocked_to_last else None
+    opening = [Change(changes[0].joint, changes[0].id, lock, b"\1", b"\0")] if lock else []
+    for turn in range(_PASSES):
+        opened = [one for one in opening if turn == 0 or _held(bus, one) != one.after]
+        left = [one for one in rest if turn == 0 or opened or _held(bus, one) != one.after]
+        for one in (*opened, *left):
+            _put(bus, one.id, one.register, one.after)
         if not left:
             break
-        for one in left:
-            _put(bus, one.id, one.register, one.after)
-    wrong = [f"{one}: it holds {held.hex()} all the same" for one, held in _still(bus, rest)]
-    if unlocks and lock:
-        _put(bus, changes[0].id, lock, b"\1")
+    wrong = [f"{one}: it holds {held.hex()} all the same" for one, held in _still(bus, (*opening, *rest))]
+    for one in () if wrong else last:
+        _put(bus, one.id, one.register, one.after)
+    for one in opening:
+        _put(bus, one.id, one.register, one.before)
     if wrong:
         advice = "Its table may be locked: switch its power off and on, and try again"
         raise NoSolutionError(f"{'; '.join(wrong)}. {advice}")
-    for one in last:
-        _put(bus, one.id, one.register, one.after)
 
 
 def _still(bus: Bus, changes: Sequence[Change]) -> Iterator[tuple[Change, bytes]]:

@@ -253,6 +253,7 @@ _BUS: Mapping[str, _Kind] = {
         lambda value: value in ("torque_limit", "torque_enable", "nothing"),
         '"torque_limit", "torque_enable" or "nothing": what a shutdown sets to 0',
     ),
+    "unlocked_to_last": (lambda value: isinstance(value, bool), "true or false"),
     "homing_sign": (lambda value: value in (1, -1), "1 or -1"),
 }
 _ROW: Mapping[str, _Kind] = {

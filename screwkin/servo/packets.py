@@ -80,8 +80,6 @@ class ProtocolFacts:
         levels: least status level at which a ping, a read, and anything else is answered.
         partial_reset: a factory reset may spare the lasting registers.
         locked_while_stiff: the lasting registers cannot be written while torque is on.
-        unlocked_to_last: what is written to them while ``lock`` is 1 lasts until the power goes off;
-            elsewhere a ``lock`` of 1 refuses them until then.
     """
 
     name: ProtocolName
@@ -101,7 +99,6 @@ class ProtocolFacts:
     levels: tuple[int, int, int]
     partial_reset: bool
     locked_while_stiff: bool
-    unlocked_to_last: bool
 
 
 @dataclass(frozen=True)

@@ -86,8 +86,10 @@ class Profile:
     ``multi_turn`` which value of both angle limits lets it turn over several turns; ``alarms`` the bits of
     its shutdown and hardware error registers; ``reverse_bit`` that of ``drive_mode`` by which it turns the
     other way; a position shown is the true one plus ``homing_sign`` times ``homing_offset``;
-    ``shutdown_clears`` is the register that a shutdown sets to 0; ``source`` is
-    where its table stands, ``sheet`` where its figures do.
+    ``shutdown_clears`` is the register that a shutdown sets to 0; ``unlocked_to_last``: what is written to
+    its lasting registers is forgotten with the power unless ``lock`` is 0 meanwhile (elsewhere a ``lock`` of
+    1 refuses them until the power goes off); ``source`` is where its table stands, ``sheet`` where its
+    figures do.
     """
 
     model: str
@@ -116,6 +118,7 @@ class Profile:
     reverse_bit: int = 0
     homing_sign: int = 1
     shutdown_clears: Literal["torque_limit", "torque_enable", "nothing"] = "torque_limit"
+    unlocked_to_last: bool = False
     stall_current: float = 0.0
     baud_from_250: tuple[int, ...] = ()
     source: str = ""

@@ -49,7 +49,6 @@ FACTS = ProtocolFacts(
     levels=(0, 1, 2),
     partial_reset=False,
     locked_while_stiff=True,
-    unlocked_to_last=False,
 )
 
 _HEADER = b"\xff\xff"

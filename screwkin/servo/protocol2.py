@@ -55,7 +55,6 @@ FACTS = ProtocolFacts(
     levels=(0, 1, 2),
     partial_reset=True,
     locked_while_stiff=True,
-    unlocked_to_last=False,
 )
 
 _HEADER = b"\xff\xff\xfd\x00"

@@ -39,7 +39,6 @@ FACTS = replace(
     model_at=3,
     levels=(0, 0, 1),
     locked_while_stiff=False,
-    unlocked_to_last=True,
 )
 
 _BITS: Mapping[int, ErrorBit] = {0: "voltage", 1: "hardware", 2: "overheat", 3: "overload", 5: "overload"}

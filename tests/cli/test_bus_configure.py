@@ -39,10 +39,16 @@ class Plugged:
         yield Bus(self.line, protocol, baud, self.clock, port=port)
 
     @property
+    def lasting(self) -> dict[int, bytes]:
+        """What every servo holds once its power was off and on again."""
+        return {servo.id: servo._lasting for servo in self.line.servos}
+
+    @property
     def tables(self) -> dict[int, bytes]:
         """The bytes of every servo that last: measurements aside."""
         return {
             servo.id: bytes(servo.table[: servo.profile.ram_begins])
+            + self.lasting[servo.id]
             + bytes([servo.get("status_level"), servo.get("torque_enable")])
             for servo in self.line.servos
         }
@@ -96,6 +102,7 @@ def test_a_difference_is_named_by_scan_mended_by_configure_and_restored(
     assert register in [one["register"] for one in called.data["written"]]
     assert differences(Bus(port.line, robot_protocol(table), clock=port.clock), load_robot(table)) == ()
     assert set(port.written) == {KNEE}, "nobody else is written to"
+    assert all(port.tables[id].startswith(data) for id, data in port.lasting.items()), "it outlasts the power"
     assert all(servo.get("torque_enable") == 0 for servo in port.line.servos)
 
     backup = tmp_path / "out" / "backup.json"

@@ -55,10 +55,29 @@ PROTOCOL_2 = [
     ({"status_level": 1}, "status_level", "1"),
     ({"status_level": 0}, "status_level", "0"),
 ]
+STS = [
+    ({"operating_mode": 1}, "operating_mode", "1 (velocity mode)"),
+    ({"operating_mode": 2}, "operating_mode", "2 (pwm mode)"),
+    ({"operating_mode": 3}, "operating_mode", "3 (step mode)"),
+    ({"angle_limit_low": 0, "angle_limit_high": 0}, "angle_limit_high", "0 (multi-turn mode)"),
+    ({"angle_limit_low": 1900, "angle_limit_high": 2200}, "angle_limit_low", "1900 (joint mode)"),
+    ({"drive_mode": 140}, "drive_mode", "140"),
+    ({"homing_offset": -512}, "homing_offset", "-512"),
+    ({"resolution_divider": 2}, "resolution_divider", "2"),
+    ({"acceleration": 10}, "acceleration", "10"),
+    ({"max_torque": 400}, "max_torque", "400"),
+    ({"current_limit": 100}, "current_limit", "100"),
+    ({"shutdown": 0}, "shutdown", "0"),
+    ({"alarm_led": 0}, "alarm_led", "0"),
+    ({"return_delay": 254}, "return_delay", "254"),
+    ({"status_level": 0}, "status_level", "0"),
+]
 FAULTS = [
     *(("AX-12A", *row) for row in PROTOCOL_1),
     *(("MX-28", *row) for row in (*PROTOCOL_1[2:], *MX_1)),
     *(("MX-28-2", *row) for row in PROTOCOL_2),
+    *(("XL430-W250", *row) for row in PROTOCOL_2),
+    *(("STS3215", *row) for row in STS),
 ]
 
 

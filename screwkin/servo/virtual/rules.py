@@ -27,9 +27,9 @@ def write_outcome(
         value: with its sign.
     """
     lasting = register.address < profile.ram_begins
-    if register.access == "r" or (lasting and _locked(facts, get)):
+    if register.access == "r" or (lasting and _locked(profile, facts, get)):
         return "access"
-    if register.name == "lock" and not facts.unlocked_to_last and get("lock") and not value:
+    if register.name == "lock" and not profile.unlocked_to_last and get("lock") and not value:
         return "access"  # only switching the power off unlocks it
     if register.name in _GOALS and get("bus_watchdog") == TRIPPED:
         return "range"
@@ -40,11 +40,11 @@ def write_outcome(
     return "done" if low <= value <= high else "limit"
 
 
-def _locked(facts: ProtocolFacts, get: Get) -> bool:
+def _locked(profile: Profile, facts: ProtocolFacts, get: Get) -> bool:
     """Whether the lasting registers cannot be written."""
     if facts.locked_while_stiff and get("torque_enable"):
         return True
-    return bool(get("lock")) and not facts.unlocked_to_last
+    return bool(get("lock")) and not profile.unlocked_to_last
 
 
 def _bounds(mode: Mode, get: Get, register: Register) -> tuple[int, int]:

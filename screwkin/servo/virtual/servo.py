@@ -295,7 +295,7 @@ class VirtualServo:
         for place, byte in zip(self._places_of(address, len(data)), data, strict=True):
             self.table[place] = byte
         self._frame = None
-        if not (self._facts.unlocked_to_last and self._get("lock")):
+        if not (self.profile.unlocked_to_last and self._get("lock")):
             self._lasting = bytes(self.table[: self.profile.ram_begins])
         written = {name for name in ("goal_position", "torque_limit") if self._touches(name, address, data)}
         self._heed(written, bool(stiff), mode)
