@@ -28,8 +28,8 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from copy import deepcopy
 from dataclasses import dataclass
+from functools import cached_property
 from importlib.abc import InspectLoader
 from pathlib import Path
 
@@ -64,42 +64,45 @@ Change = Callable[[ast.AST], None]
 
 @dataclass(frozen=True)
 class Mutant:
-    """One place of a file's code, and the fault there; ``text`` is the whole file with it."""
+    """One place of a file's code, by the number of its node, and the fault there."""
 
     file: str
     number: int
     line: int
     what: str
     place: str
-    text: str
+    node: int
+    change: Change
 
     @property
     def name(self) -> str:
         """As ``--only`` takes it, and what is wrong."""
         return f"{self.file}:{self.number} line {self.line}: {self.what}"
 
+    @cached_property
+    def text(self) -> str:
+        """The whole file with the fault."""
+        tree = _tree(self.file)
+        self.change(list(ast.walk(tree))[self.node])
+        return ast.unparse(ast.fix_missing_locations(tree)) + "\n"
+
 
 def mutants(file: str) -> list[Mutant]:
     """Every fault that can be written into a file of ``screwkin/servo``."""
-    tree = ast.parse(_source(file).read_text(encoding="utf-8"))
     alike: Counter[str] = Counter()
     everyone = []
-    for i, (index, line, what, change) in enumerate(_places(tree)):
+    for i, (node, line, what, change) in enumerate(_places(_tree(file))):
         alike[what] += 1
-        place = f"{file} {what} {alike[what]}"
-        everyone.append(Mutant(file, i, line, what, place, _changed(tree, index, change)))
+        everyone.append(Mutant(file, i, line, what, f"{file} {what} {alike[what]}", node, change))
     return everyone
+
+
+def _tree(file: str) -> ast.Module:
+    return ast.parse(_source(file).read_text(encoding="utf-8"))
 
 
 def _source(file: str) -> Path:
     return CHECKOUT / "screwkin" / "servo" / f"{file}.py"
-
-
-def _changed(tree: ast.Module, index: int, change: Change) -> str:
-    """The code of a tree whose node of that number is another."""
-    copy = deepcopy(tree)
-    change(list(ast.walk(copy))[index])
-    return ast.unparse(ast.fix_missing_locations(copy)) + "\n"
 
 
 def _places(tree: ast.Module) -> Iterator[tuple[int, int, str, Change]]:
