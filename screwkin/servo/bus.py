@@ -226,7 +226,6 @@ class Bus:
         packet = Packet(BROADCAST, Instruction.SYNC_READ, bytes((address, length, *ids)))
         self._port.clearPort()
         self._port.writePort(self._codec.pack(packet))
-        self._port.setPacketTimeout((self._facts.answer_size + length) * len(ids))
         return self._sdk.COMM_SUCCESS
 
     def _ask(self, id: int, address: int, length: int) -> tuple[bytes, int, int]:

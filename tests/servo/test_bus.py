@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import termios
 
 import pytest
 
 from screwkin.errors import InputError, ScrewkinError
 from screwkin.servo.bus import Bus, open_line
-from screwkin.servo.line import BusError, LineLostError, PortError, RefusedError
+from screwkin.servo.line import BusError, LineLostError, PortError, RefusedError, Reply
+from screwkin.servo.profiles import load_profile
+from screwkin.servo.virtual.bus import SimulatedClock, VirtualBus
+from screwkin.servo.virtual.servo import VirtualServo
 
 
 class Recorded:
@@ -82,6 +86,12 @@ def test_error_bits_are_named():
     """The published status with error byte 24: overheat and overload."""
     reply = bus_on(Recorded("FF FF 01 02 24 D8")).write(1, 24, 1, 1)
     assert reply.errors == {"overheat", "overload"}
+
+
+def test_a_refused_reading_is_an_error_with_its_name():
+    """Range error: there is no such address."""
+    with pytest.raises(RefusedError, match=r"servo 1 refused .range error. reading 2 bytes at 200"):
+        bus_on(Recorded("FF FF 01 02 08 F4")).read(1, 200, 2)
 
 
 @pytest.mark.parametrize(
@@ -165,6 +175,102 @@ def test_servos_that_do_not_answer_are_left_out_of_a_group():
     assert sorted(found) == [1, 3]
 
 
+def test_a_sync_read_of_protocol_2_is_the_published_packet():
+    line = Recorded(
+        "FF FF FD 00 01 08 00 55 00 A6 00 00 00 8C C0 FF FF FD 00 02 08 00 55 00 1F 08 00 00 BA BE"
+    )
+    found = bus_on(line, 2.0).read_many([1, 2], 132, 4, "sync")
+    assert line.sent == ["FF FF FD 00 FE 09 00 82 84 00 04 00 01 02 CE FA"]
+    assert [found[id].value for id in (1, 2)] == [166, 2079]
+
+
+def test_a_sync_read_of_ft_scs_is_the_published_packet_and_who_is_silent_is_asked_alone():
+    """The example of the maker's description: position and speed (0x38, 8 bytes) of servos 1 and 2."""
+    line = Recorded("FF FF 01 0A 00 00 08 00 00 00 00 79 1E 55", "")
+    bus = bus_on(line, "FT-SCS", retries=0)
+    found = bus.read_many([1, 2], 0x38, 8, "sync")
+    assert line.sent == ["FF FF FE 06 82 38 08 01 02 36", "FF FF 02 04 02 38 08 B7"]
+    assert {id: reply.data for id, reply in found.items()} == {1: bytes.fromhex("00 08 00 00 00 00 79 1E")}
+    assert (bus.statistics.exchanges, bus.statistics.failed) == (3, 2), "both tries with servo 2"
+
+
+def test_a_group_of_one_is_asked_as_one():
+    line = Recorded("FF FF 01 03 00 20 DB")
+    assert bus_on(line).read_many([1], 0x2B, 1, "bulk")[1].value == 0x20
+    assert line.sent == ["FF FF 01 04 02 2B 01 CC"]
+
+
+def test_a_pulled_cable_is_no_servo_that_is_left_out_of_a_group():
+    line = Recorded("FF FF 01 03 00 20 DB", OSError(5, "Input/output error"))
+    with pytest.raises(LineLostError, match="the port is gone"):
+        bus_on(line).read_many([1, 2], 0x2B, 1)
+
+
+def test_a_port_that_takes_only_a_part_of_a_packet_is_lost():
+    line = Recorded()
+    line.write = lambda data: len(data) - 1
+    with pytest.raises(LineLostError, match="does not take the packet"):
+        bus_on(line).sync_write(30, 2, {1: b"\0\2"})
+
+
+def test_who_does_not_say_otherwise_talks_protocol_1():
+    line = Recorded("FF FF 01 03 00 20 DB")
+    assert Bus(line, clock=line).read(1, 0x2B, 1).value == 0x20
+
+
+def test_a_write_to_all_waits_for_nobody():
+    line = Recorded()
+    bus = bus_on(line)
+    reply = bus.write(254, 24, 1, 1)
+    assert line.sent == ["FF FF FE 04 03 18 01 E1"]
+    assert (reply.id, reply.data, reply.errors) == (254, b"", frozenset())
+    assert (line.time, bus.statistics.exchanges) == (0.0, 0)
+
+
+@pytest.mark.parametrize(("strangers", "heard"), [(0, True), (7, True), (8, False), (9, False)])
+def test_seven_replies_of_other_servos_are_passed_over(strangers, heard):
+    line = Recorded("FF FF 02 03 00 20 DA" * strangers + "FF FF 01 03 00 21 DA")
+    bus = bus_on(line, retries=0)
+    if heard:
+        assert bus.read(1, 0x2B, 1).value == 0x21
+    else:
+        with pytest.raises(BusError):
+            bus.read(1, 0x2B, 1)
+
+
+@pytest.mark.parametrize(
+    ("reply", "there"), [("FF FF 01 02 00 FC", True), ("FF FF 01 02 00 FD", True), ("", False)]
+)
+def test_who_answers_a_ping_is_there_and_so_is_one_whose_answer_is_damaged(reply, there):
+    """Damaged answers are those of two servos with one id."""
+    line = Recorded(reply, reply)
+    assert bus_on(line, retries=1).present(1) is there
+    assert set(line.sent) == {"FF FF 01 02 01 FB"}
+
+
+def test_an_answer_to_a_ping_is_waited_for_however_long_the_bus_has_been_silent():
+    clock = SimulatedClock()
+    servo = VirtualServo(load_profile("AX-12A"), 7, return_delay=500e-6)
+    bus = Bus(VirtualBus([servo], clock), clock=clock, patience=0.005)
+    clock.sleep(10.0)
+    assert bus.present(7)
+    assert not bus.present(8)
+
+
+def test_statistics_count_exchanges_and_time_those_that_succeed():
+    line = Recorded("FF FF 01 03 00 20 DB", "FF FF 01 03 00 20 DC", "FF FF 01 03 00 20 DC", "", "")
+    bus, counts = bus_on(line, patience=0.25), None
+    assert bus.patience == 0.25
+    bus.read(1, 0x2B, 1)
+    for _ in range(2):
+        with pytest.raises(BusError):
+            bus.read(1, 0x2B, 1)
+    counts = bus.statistics
+    assert (counts.exchanges, counts.retries, counts.failed) == (3, 2, 2)
+    assert (counts.corrupt, counts.silent, len(counts.recent)) == (2, 2, 1)
+    assert counts.longest < 0.25 < line.time
+
+
 def test_a_bulk_read_asks_all_in_one_packet():
     line = Recorded("FF FF 01 03 00 20 DB FF FF 02 03 04 21 D5")
     found = bus_on(line).read_many([1, 2], 0x2B, 1, "bulk")
@@ -176,7 +282,7 @@ def test_a_bulk_read_asks_all_in_one_packet():
 def test_reg_write_waits_for_action():
     line = Recorded("FF FF 01 02 00 FC")
     bus = bus_on(line)
-    bus.reg_write(1, 30, 0x01F4, 2)
+    assert bus.reg_write(1, 30, 0x01F4, 2) == Reply(1, b"")
     bus.action()
     assert line.sent == ["FF FF 01 05 04 1E F4 01 E2", "FF FF FE 02 05 FA"]
 
@@ -196,6 +302,23 @@ def test_what_fits_in_no_packet_is_refused_before_anything_is_sent(act):
     with pytest.raises(InputError):
         act(bus_on(line))
     assert line.sent == []
+
+
+@pytest.mark.skipif(not hasattr(os, "openpty"), reason="a system without pseudo-terminals")
+def test_a_port_is_ours_alone_and_reading_it_never_waits():
+    master, slave = os.openpty()
+    line = open_line(os.ttyname(slave), 57_600)
+    try:
+        assert (line.timeout, line.baudrate) == (0, 57_600)
+        assert line.read(4) == b""
+        assert line.write(b"\x01\xff") == 2
+        assert os.read(master, 4) == b"\x01\xff"
+        with pytest.raises(PortError, match="cannot open port"):
+            open_line(os.ttyname(slave))
+    finally:
+        line.close()
+        os.close(master)
+        os.close(slave)
 
 
 def test_a_port_that_is_not_there_is_bad_input():

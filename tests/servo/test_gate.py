@@ -144,6 +144,24 @@ def test_a_step_too_fast_for_its_time_is_refused():
     assert len(bus.packets) == 3
 
 
+def test_a_step_at_the_greatest_speed_passes_and_one_of_a_hundredth_more_does_not():
+    """The difference of two positions is rounded: 6 rad/s may come out a little above."""
+    for steps in range(1, 20):
+        gate = Gate(Recorder(), Bounds.of(BIOLOID))
+        q = np.full(18, 0.05 * steps)
+        gate.goals(q)
+        gate.goals(q - 6.0 * 0.02, 0.02)
+        with pytest.raises(SafetyError, match="too far from the last ones"):
+            gate.goals(q + 6.0 * 0.0002, 0.02)
+
+
+def test_a_greatest_speed_of_so_many_units_is_written_as_these():
+    """Rounding in the division does not cost a unit: n x 0.111 rpm are n, for every n."""
+    for units in (1, 3, 100, 333, 516):
+        bounds = Bounds.of(narrow(BIOLOID, velocity=units * 0.111 * math.pi / 30))
+        assert set(bounds.speed.tolist()) == {units}
+
+
 def test_one_packet_carries_goal_and_speed_of_all_servos():
     bus = Recorder()
     Gate(bus, Bounds.of(BIOLOID)).goals(np.zeros(18))
@@ -170,9 +188,11 @@ def test_a_joint_whose_limits_its_servo_cannot_reach_is_refused():
 
 
 def test_a_speed_that_a_servo_cannot_be_told_is_refused_and_not_taken_for_none():
-    """A speed register of 0 would mean no limit at all."""
-    with pytest.raises(SafetyError, match="less than its servo's smallest speed"):
-        Bounds.of(narrow(BIOLOID, velocity=0.01))
+    """A speed register of 0 would mean no limit at all; the unit is 0.01162 rad/s."""
+    slow = {"right_hip_yaw": 0.0117, "left_knee": 0.01}
+    joints = tuple(replace(joint, velocity=slow.get(joint.name, 6.0)) for joint in BIOLOID.joints)
+    with pytest.raises(SafetyError, match=r"left_knee: 0.01 rad/s is less than its servo's smallest speed"):
+        Bounds.of(replace(BIOLOID, joints=joints))
 
 
 @pytest.mark.parametrize("share", [-0.1, 1.1, math.nan, math.inf])
@@ -194,6 +214,37 @@ def test_the_effort_of_a_joint_limits_the_torque_of_its_servo(torque):
     assert dict(bus.written(34, 2)) == {
         id: math.floor(1023 * torque * expected.get(id, 1.0)) for id in range(1, 19)
     }
+
+
+@pytest.mark.parametrize(("share", "value"), [(0.0, 0), (0.5, 511), (1.0, 1023)])
+def test_torque_may_be_limited_further(share, value):
+    bus = Recorder()
+    Gate(bus, Bounds.of(BIOLOID)).torque_limit(share)
+    assert sorted(bus.written(34, 2)) == [(id, value) for id in range(1, 19)]
+
+
+def test_torque_is_switched_for_all_or_for_those_that_are_chosen():
+    bounds, bus = Bounds.of(BIOLOID), Recorder()
+    gate = Gate(bus, bounds)
+    gate.torque(True)
+    gate.torque(False, [3, 5])
+    assert [(address, set(data.values())) for address, data in bus.packets] == [(24, {b"\1"}), (24, {b"\0"})]
+    assert [sorted(data) for _, data in bus.packets] == [
+        sorted(bounds.ids), sorted((bounds.ids[3], bounds.ids[5]))
+    ]  # fmt: skip
+
+
+@given(st.lists(st.floats(-4, 4), min_size=18, max_size=18))
+def test_the_nearest_posture_within_limits_is_within_them_and_others_stay(q):
+    """From the limits in radians: what lies between them stays, the rest ends less than a tick inside."""
+    robot = narrow(replace(BIOLOID, postures=()), lower=-1.0, upper=1.2)
+    within, tick = Bounds.of(robot).within(np.array(q)), math.radians(300) / 1024
+    for angle, got in zip(q, within.tolist(), strict=True):
+        if -1.0 + tick < angle < 1.2 - tick:
+            assert got == pytest.approx(angle, abs=1e-12)
+        else:
+            assert abs(got - min(max(angle, -1.0), 1.2)) < tick
+            assert -1.0 <= got <= 1.2
 
 
 def test_staying_says_what_was_written_within_the_limits():

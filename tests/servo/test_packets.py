@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 import screwkin
 from screwkin.errors import InputError
 from screwkin.servo import protocol1, protocol2, protocol_scs
-from screwkin.servo.packets import Packet, Request
+from screwkin.servo.packets import Packet, Request, rows
 from screwkin.servo.profiles import load_profile
 from screwkin.servo.protocols import CODECS, codec, protocol_named
 from screwkin.servo.virtual.bus import SimulatedClock, VirtualBus
@@ -232,6 +232,47 @@ def test_reads_of_many_are_answered_in_turn():
     write = Packet(0xFE, 0x93, hexed("01 20 00 02 00 A0 00 02 1F 00 01 00 50"))
     assert protocol2.command_for(write, 2) == Request("write", 31, data=b"\x50", answers=False)
     assert protocol2.command_for(Packet(0xFE, 1), 4) == Request("ping", after=(0, 1, 2, 3))
+
+
+@pytest.mark.parametrize(
+    ("instruction", "params", "request_of_1", "request_of_2"),
+    [
+        (0x01, "", Request("ping", 0, 0, b""), Request("ping", 0, 0, b"")),
+        (0x02, "24 02", Request("read", 0x24, 2), Request("malformed")),
+        (0x02, "84 00 04 00", Request("malformed"), Request("read", 0x84, 4)),
+        (0x02, "24", Request("malformed"), Request("malformed")),
+        (0x03, "1E F4 01", Request("write", 0x1E, data=b"\xf4\x01"), Request("write", 0xF41E, data=b"\1")),
+        (0x03, "1E", Request("malformed"), Request("malformed")),
+        (0x03, "", Request("malformed"), Request("malformed")),
+        (0x04, "1E 00 01", Request("register", 0x1E, data=b"\0\1"), Request("register", 0x1E, data=b"\1")),
+        (0x05, "", Request("action"), Request("action")),
+        (0x06, "", Request("factory reset"), Request("factory reset")),
+        (0x06, "01", Request("factory reset", data=b"\1"), Request("factory reset", data=b"\1")),
+        (0x08, "", Request("unknown"), Request("reboot")),
+        (0x77, "", Request("unknown"), Request("unknown")),
+    ],
+)
+def test_what_the_instructions_of_the_makers_tables_ask(instruction, params, request_of_1, request_of_2):
+    packet = Packet(7, instruction, hexed(params))
+    assert protocol1.command_for(packet, 7) == request_of_1
+    assert protocol2.command_for(packet, 7) == request_of_2
+    assert protocol1.command_for(packet, 8) is protocol2.command_for(packet, 8) is None
+
+
+def test_a_request_that_says_no_more_asks_for_no_bytes():
+    ping = Request("ping")
+    assert (ping.address, ping.length, ping.data, ping.answers, ping.after) == (0, 0, b"", True, ())
+
+
+@given(st.binary(max_size=30), st.integers(-1, 8))
+def test_parameters_are_cut_into_rows_that_fit(params, size):
+    cut = rows(params, size)
+    if size < 1 or len(params) % size:
+        assert cut is None
+    else:
+        assert cut is not None
+        assert b"".join(cut) == params
+        assert {len(row) for row in cut} <= {size}
 
 
 @EACH

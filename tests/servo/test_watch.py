@@ -101,6 +101,31 @@ def test_a_joint_must_be_near_a_goal_of_the_last_tenth_of_a_second():
             assert stopped(watched.tracked, 4, values, 4.9, 0.985)[:2] == ("tracking", BOUNDS.names[4])
 
 
+def test_a_goal_counts_until_the_next_one_is_a_tenth_of_a_second_old():
+    """Goals far apart: at 0.50 s that of 0.05 s has held for all of the last tenth, and none before it."""
+    watched = watch()
+    watched.frame(np.zeros(18), 0.0, 0.0)
+    watched.frame(np.ones(18), 0.0, 0.05)
+    watched.tracked(4, {**WELL, "position": 0.0}, 1.0, 0.10)  # until 0.05 s its goal was there
+    watched.tracked(4, {**WELL, "position": 1.0}, 1.0, 0.10)
+    assert stopped(watched.tracked, 4, {**WELL, "position": 0.0}, 1.0, 0.5)[0] == "tracking"
+    watched.tracked(4, {**WELL, "position": 1.0}, 1.0, 0.5)
+
+
+def test_a_servo_that_has_not_been_read_for_half_a_second_stops_the_play():
+    """From the first frame on, or from its last answer; the one that was read least recently is named."""
+    watched = watch()
+    watched.frame(REST, 0.0, 1.0)
+    for k in set(range(18)) - {6}:
+        watched.seen(k, WELL, frozenset(), 1.3)
+    watched.frame(REST, 0.0, 1.5)
+    assert stopped(watched.frame, REST, 0.0, 1.51) == ("unseen", BOUNDS.names[6], BOUNDS.ids[6], 1.51)
+    watched.seen(6, WELL, frozenset(), 1.52)
+    watched.frame(REST, 0.0, 1.79)
+    with pytest.raises(PlayStopped, match=r"it has not been read for 0\.51 s, at most 0\.50"):
+        watched.frame(REST, 0.0, 1.81)
+
+
 @given(st.lists(st.floats(-0.24, 0.24), min_size=1))
 def test_the_greatest_tracking_error_is_remembered(errors):
     watched = watch()
