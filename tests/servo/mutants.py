@@ -28,12 +28,19 @@ import tempfile
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import redirect_stdout
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.abc import InspectLoader
+from io import StringIO
 from pathlib import Path
 
 import pytest
+from hypothesis import Phase, settings
+
+from screwkin.gait.files import load_gait
+from screwkin.gait.walk import walk
+from screwkin.model.table import load_robot
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 RESULTS = CHECKOUT / "runs" / "mutants.jsonl"
@@ -50,8 +57,6 @@ LIMIT = {"player": 400}
 """Seconds of processor after which a fault counts as noticed, and is named a timeout; 60 by default."""
 PATIENCE = 3600.0
 """Seconds of the clock after which the same is true of one that waits for ever."""
-_ALIKE = ("numpy", "hypothesis", "dynamixel_sdk", "screwkin.model.table", "screwkin.gait.walk")
-"""What no fault is in, and all tests need: imported once."""
 
 _TURNED: dict[type[ast.AST], type[ast.AST]] = {
     ast.Lt: ast.GtE, ast.LtE: ast.Gt, ast.Gt: ast.LtE, ast.GtE: ast.Lt, ast.Eq: ast.NotEq, ast.NotEq: ast.Eq,
@@ -181,6 +186,18 @@ def drawn(files: Sequence[str], count: int, seed: int) -> list[Mutant]:
     return sorted(everyone[:count], key=lambda mutant: list(TESTS).index(mutant.file))
 
 
+def _prepare() -> None:
+    """Import once what no fault is in and all tests need; failing examples are not made smaller."""
+    settings.register_profile(
+        "mutants", deadline=None, derandomize=True, max_examples=40, phases=[Phase.explicit, Phase.generate]
+    )
+    os.environ |= {"HYPOTHESIS_PROFILE": "mutants", "OMP_NUM_THREADS": "1"}
+    with redirect_stdout(StringIO()):
+        pytest.main(["-q", "-p", "no:cacheprovider", "--collect-only", "tests/gait/test_gait_files.py"])
+    importlib.import_module("dynamixel_sdk")
+    walk(load_robot("bioloid"), load_gait("smooth"), 1)
+
+
 def outcome(mutant: Mutant) -> tuple[str, str]:
     """``noticed``, ``timeout`` or ``survives``, and what the tests print."""
     with tempfile.TemporaryFile("w+") as said:
@@ -261,10 +278,8 @@ def main(words: Sequence[str] | None = None) -> int:
     options.add_argument("--seed", type=int, default=0)
     options.add_argument("--only", help="FILE:NUMBER of one mutant")
     chosen = options.parse_args(words)
-    os.environ |= {"HYPOTHESIS_PROFILE": "ci", "OMP_NUM_THREADS": "1"}
     os.chdir(CHECKOUT)
-    for name in _ALIKE:
-        importlib.import_module(name)
+    _prepare()
     if chosen.only:
         file, _, number = chosen.only.partition(":")
         mutant = mutants(file)[int(number)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from dataclasses import replace
@@ -20,12 +21,16 @@ from screwkin.servo.budget import budget
 from screwkin.servo.bus import Bus
 from screwkin.servo.frames import frames_of, run_out
 from screwkin.servo.gate import Bounds
-from screwkin.servo.player import Player, PlaySettings, describe
+from screwkin.servo.leave import Final
+from screwkin.servo.line import BusError
+from screwkin.servo.log import Log
+from screwkin.servo.player import Player, PlayOutcome, PlaySettings, describe
 from screwkin.servo.profiles import load_profile
 from screwkin.servo.servo_map import ServoMap
 from screwkin.servo.virtual.bus import SimulatedClock, VirtualBus
 from screwkin.servo.virtual.faults import InjectedFault
 from screwkin.servo.virtual.servo import VirtualServo
+from screwkin.servo.watch import ServoFault
 from screwkin.trajectory import Trajectory
 
 ROBOT = load_robot("bioloid")
@@ -85,15 +90,110 @@ def undisturbed() -> Array:
 
 
 def test_a_walk_is_played_frame_by_frame_without_drift():
-    rig = Rig()
+    rig, shares = Rig(), []
+    rig.player._progress = shares.append
     outcome = rig.play()
     assert outcome.faults == ()
     assert outcome.late_frames == 0
+    assert shares == [(i + 1) / steps().samples for i in range(steps().samples)]
     arrays = rig.player.log.arrays({})
     np.testing.assert_allclose(np.diff(arrays["sent"]), 0.02, atol=2e-4)
     assert abs(arrays["sent"][-1] - 0.02 * (outcome.frames - 1)) < 2e-4, "the last frame is as timely as any"
     assert np.isfinite(arrays["trajectory_time"]).sum() == steps().samples
     assert rig.all("torque_enable") == {1}
+    rest = arrays["command"][np.flatnonzero(np.isfinite(arrays["trajectory_time"]))[-1] + 1 :]
+    assert len(rest) == 25, "half a second at rest"
+    np.testing.assert_allclose(rest, np.tile(steps().q[-1], (25, 1)), atol=1e-12)
+
+
+def test_goals_are_where_the_servos_stand_before_torque_comes():
+    rig = Rig()
+    for servo in rig.line.servos:
+        servo.body.angle += 0.3
+    stands = {servo.id: round(servo.body.angle / servo.profile.tick) + 512 for servo in rig.line.servos}
+    seen: set[int] = set()
+    rig.line._witness = lambda time, id, command: (
+        seen.add(rig.line.servo(id).get("goal_position") - stands[id])
+        if command.kind == "write" and command.address == 24 and rig.player._frames == 0
+        else None
+    )
+    rig.play()
+    assert seen
+    assert max(map(abs, seen)) <= 1
+
+
+def test_in_a_play_nobody_waits_for_a_lost_reply():
+    """It is asked for in the next frame; before and after the play as often as ever."""
+    rig, retries = Rig(InjectedFault("dropped", 1.5, share=0.05), seed=3), []
+    rig.player._progress = lambda share: retries.append(rig.player.bus.statistics.retries)
+    before = (rig.player.bus.retries, rig.player.bus.patience)
+    assert rig.play().faults == ()
+    assert rig.player.bus.statistics.failed > 3
+    assert set(retries) == {0}
+    assert (rig.player.bus.retries, rig.player.bus.patience) == before
+
+
+def test_a_play_in_which_nothing_is_read_ends_after_half_a_second():
+    rig = Rig()
+    rig.player.readings.read = lambda *words: None
+    [fault] = rig.play().faults
+    assert fault.kind == "unseen"
+    assert 0.5 < fault.time < 0.53
+
+
+def test_who_wants_to_stop_before_anything_has_moved_is_not_kept_waiting():
+    rig = Rig()
+    rig.player._stop = lambda: True
+    with pytest.raises(KeyboardInterrupt):
+        rig.play()
+    assert {command.kind for _, _, command in rig.told} == {"read"}
+
+
+def test_a_servo_that_falls_silent_while_it_is_looked_at_is_named_and_nothing_is_written():
+    rig = Rig()
+    ask = rig.player.readings.ask
+
+    def asked(k: int):
+        if k == 3:
+            raise BusError("servo 13 does not answer to a read, tried 2 times", 13)
+        return ask(k)
+
+    rig.player.readings.ask = asked
+    with pytest.raises(SafetyError, match="right_knee: servo 13 does not answer"):
+        rig.play()
+    assert {command.kind for _, _, command in rig.told} == {"read"}
+
+
+def test_the_reading_that_stopped_a_play_is_the_last_of_its_log(tmp_path):
+    path = tmp_path / "play.jsonl"
+    rig = Rig(InjectedFault("overheat", WITHIN, id=11))
+    with path.open("w+b", buffering=0) as file:
+        rig.player.log = Log(rig.player.bounds.names, rig.player.bounds.ids, file)
+        [fault] = rig.play().faults
+        *_, last = map(json.loads, path.read_text().splitlines())
+    assert fault.id == rig.player.bounds.ids[last[1]] == 11
+    assert (last[0], last[2]) == ("read", pytest.approx(fault.time, abs=1e-3))
+
+
+@pytest.mark.parametrize(
+    ("final", "faults", "known", "well"),
+    [
+        (Final("hold"), 0, True, True),
+        (Final("limp"), 1, True, False),
+        (Final("limp", ("right_knee",)), 0, False, False),
+        (Final("limp", ("right_knee",)), 1, False, False),
+        (Final("unknown", ("right_knee",)), 0, False, False),
+        (Final("unknown"), 0, False, False),
+        (Final("unknown"), 1, False, False),
+    ],
+)
+def test_well_is_what_was_played_to_its_end_and_confirmed_by_every_servo(final, faults, known, well):
+    fault = ServoFault("late", "", -1, 1.0, "a frame was late")
+    outcome = PlayOutcome(100, 0, 0.1, (fault,) * faults, final, Log(("right_knee",), (13,)))
+    assert (outcome.known, outcome.well) == (known, well)
+    told = outcome.to_dict()
+    assert (told["state"], tuple(told["unconfirmed"])) == (final.state, final.unconfirmed)
+    assert [one["kind"] for one in told["faults"]] == ["late"] * faults
 
 
 def test_tracking_is_what_the_servos_motion_allows():
@@ -103,8 +203,9 @@ def test_tracking_is_what_the_servos_motion_allows():
     assert 0.2 * 0.025 * fastest < outcome.max_tracking_error < (0.025 + 0.02) * fastest + 0.01
 
 
-def test_the_soft_start_comes_from_the_measured_pose_at_the_start_speed():
-    rig = Rig(start_speed=0.25)
+@pytest.mark.parametrize(("settings", "speed"), [({"start_speed": 0.25}, 0.25), ({}, 0.5)])
+def test_the_soft_start_comes_from_the_measured_pose_at_the_start_speed(settings, speed):
+    rig = Rig(**settings)
     for servo in rig.line.servos:
         servo.body.angle += 0.3
     before = [servo.body.angle for servo in rig.line.servos]
@@ -112,7 +213,7 @@ def test_the_soft_start_comes_from_the_measured_pose_at_the_start_speed():
     arrays = rig.player.log.arrays({})
     start = np.isnan(arrays["trajectory_time"]) & (np.arange(len(arrays["time"])) < 200)
     rates = np.abs(np.diff(arrays["command"][start], axis=0)) / 0.02
-    assert rates.max() <= 0.25 * (1 + 1e-6)
+    assert 0.7 * speed < rates.max() <= speed * (1 + 1e-6)
     servos = ServoMap.of(ROBOT).joints
     first = [s.direction * a - s.zero for s, a in zip(servos, before, strict=True)]
     np.testing.assert_allclose(arrays["command"][0], first, atol=0.01)
