@@ -8,8 +8,8 @@ A fault is one place of a syntax tree that says something else: a comparison or 
 changed, a condition negated, ``and`` for ``or``, a call left out, ``return`` of nothing, another exception.
 Texts, annotations and docstrings stay. The places are drawn by a seed, each by itself, so that an edit of the
 code moves no other. The tests of the file run in a process of their own, up to the first that fails. Every
-result is a line of ``runs/mutants.jsonl``; a fault is tried anew when its file has changed, and one that was
-not noticed when the tests have. What survives, and why, stands in ``tests/servo/mutants.md``.
+result is a line of ``runs/mutants.jsonl``; a fault is tried anew when the function around it has changed,
+and one that was not noticed when the tests have. What survives, and why: ``tests/servo/mutants.md``.
 """
 
 from __future__ import annotations
@@ -85,11 +85,21 @@ class Mutant:
         return f"{self.file}:{self.number} line {self.line}: {self.what}"
 
     @cached_property
-    def text(self) -> str:
-        """The whole file with the fault."""
+    def tree(self) -> ast.Module:
+        """The code of the file with the fault."""
         tree = _tree(self.file)
         self.change(list(ast.walk(tree))[self.node])
-        return ast.unparse(ast.fix_missing_locations(tree)) + "\n"
+        return ast.fix_missing_locations(tree)
+
+    @cached_property
+    def code(self) -> str:
+        """What the fault is, and the function that it is in: as long as both stay, so does its result."""
+        around = [
+            part
+            for part in ast.walk(self.tree)
+            if isinstance(part, ast.FunctionDef) and part.lineno <= self.line <= (part.end_lineno or 0)
+        ]
+        return _digest(f"{self.place} {ast.unparse(around[-1]) if around else ''}")
 
 
 def mutants(file: str) -> list[Mutant]:
@@ -173,7 +183,7 @@ class Faulty(InspectLoader):
         self.mutant = mutant
 
     def get_source(self, fullname: str) -> str:
-        return self.mutant.text
+        return ast.unparse(self.mutant.tree) + "\n"
 
 
 def drawn(files: Sequence[str], count: int, seed: int) -> list[Mutant]:
@@ -249,21 +259,20 @@ def _digest(text: str) -> str:
 
 
 def _results() -> dict[str, dict[str, str]]:
-    """The last result of every fault, by the code with it."""
+    """The last result of every fault, by its code."""
     lines = RESULTS.read_text(encoding="utf-8").splitlines() if RESULTS.exists() else []
     return {row["code"]: row for row in map(json.loads, lines)}
 
 
 def result(mutant: Mutant, before: dict[str, dict[str, str]]) -> str:
     """The outcome, from the file of results where it still holds, else appended to it."""
-    code = _digest(mutant.text)
     tests = [CHECKOUT / "tests" / "servo" / f"{name}.py" for name in TESTS[mutant.file]]
     by = _digest("".join(path.read_text(encoding="utf-8") for path in tests))
-    last = before.get(code)
+    last = before.get(mutant.code)
     if last and (last["outcome"] != "survives" or last["tests"] == by):
         return last["outcome"]
     ended, _ = outcome(mutant)
-    row = {"code": code, "tests": by, "outcome": ended, "name": mutant.name}
+    row = {"code": mutant.code, "tests": by, "outcome": ended, "name": mutant.name}
     RESULTS.parent.mkdir(exist_ok=True)
     with RESULTS.open("a", encoding="utf-8") as out:
         out.write(json.dumps(row) + "\n")
