@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from screwkin.servo.bus import Grouped
 from screwkin.servo.profiles import Profile
@@ -17,13 +18,31 @@ HEALTH = ("present_voltage", "present_temperature")
 _FARTHEST = 24  # bytes that are read along to have the torque registers in the same block
 
 
-def block_of(profile: Profile) -> tuple[int, int, tuple[str, ...]]:
-    """Address and length of the bytes that are read from a servo in a play, and the registers in them."""
+class Block(NamedTuple):
+    """The bytes that are read from a servo in a play: address, length, and where in them each register is."""
+
+    start: int
+    length: int
+    places: Mapping[str, int]
+
+
+def block_of(profile: Profile) -> Block:
+    """The registers of a play as they stand in a servo's table, with those between them."""
     names = [name for name in (*BLOCK, *HEALTH) if name in profile.registers]
     end = max(profile.register(name).end for name in names)
     names = [name for name in names if end - profile.register(name).address <= _FARTHEST]
     start = min(profile.register(name).address for name in names)
-    return start, end - start, tuple(names)
+    return Block(start, end - start, {name: profile.register(name).address - start for name in names})
+
+
+def indirect_block(profile: Profile) -> Block | None:
+    """All registers of a play side by side, by indirect addresses; None where there is no room for them."""
+    places, length = {}, 0
+    for name in (*BLOCK, *HEALTH):
+        places[name] = length
+        length += profile.register(name).width
+    shadows = profile.indirect
+    return Block(shadows.data, length, places) if shadows and length <= shadows.count else None
 
 
 @dataclass(frozen=True)
@@ -62,7 +81,7 @@ class Budget:
 
 
 def grouping(profiles: Sequence[Profile]) -> Grouped:
-    """How the servos of a bus can be asked in one packet: all of one model that has one for it."""
+    """How the servos of a bus can be asked in one packet, whatever their firmware: all of one model."""
     if len({profile.model for profile in profiles}) > 1 or len(profiles) < 2:
         return "none"
     if profiles[0].has_sync_read:
@@ -103,7 +122,7 @@ def budget(
     goals = sum(len(row) + sum(row) for row in rows)  # an id before each
     models = {profile.model: row for profile, row in zip(profiles, rows, strict=True)}
     packets = sum(map(len, models.values()))
-    longest = max(block_of(profile)[1] for profile in profiles)
+    longest = max(block_of(profile).length for profile in profiles)
     more = (facts.answer_size + longest) * byte + return_delay  # an answer that follows another
     read = facts.read_size * byte + more + adapter if answer is None else answer
     write = (goals + packets * facts.sync_size) * byte

@@ -243,9 +243,11 @@ _BUS: Mapping[str, _Kind] = {
     ),
     "indirect": (
         lambda value: (
-            isinstance(value, Mapping) and set(value) == set(_INDIRECT) and all(map(_integer, value.values()))
+            isinstance(value, Mapping)
+            and set(_INDIRECT) <= set(value) <= {*_INDIRECT, "firmware"}
+            and all(map(_integer, value.values()))
         ),
-        f"{', '.join(_INDIRECT)}",
+        f"{', '.join(_INDIRECT)}; and firmware, the first that has it there",
     ),
     "fast_sync_read": (lambda value: _integer(value, 1, 255), "the first firmware that has it"),
     "reverse_bit": (lambda value: _integer(value, 0, 7), "the bit of drive_mode that reverses"),

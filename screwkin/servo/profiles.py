@@ -64,11 +64,15 @@ class Register:
 
 @dataclass(frozen=True)
 class Indirect:
-    """A table within the table: address n of ``count``, 2 bytes wide, says what byte n of the data is."""
+    """A table within the table: address n of ``count``, 2 bytes wide, says what byte n of the data is.
+
+    ``firmware`` is the first that has it at these places.
+    """
 
     addresses: int
     data: int
     count: int
+    firmware: int = 0
 
 
 @dataclass(frozen=True)

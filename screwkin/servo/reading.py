@@ -7,11 +7,11 @@ from collections import deque
 from collections.abc import Callable
 
 from screwkin.errors import SafetyError
-from screwkin.servo.budget import block_of, budget, grouping
-from screwkin.servo.bus import Bus, Grouped
+from screwkin.servo.budget import block_of, budget, grouping, indirect_block
+from screwkin.servo.bus import Bus
 from screwkin.servo.gate import Bounds
 from screwkin.servo.line import BusError, LineLostError, Reply
-from screwkin.servo.profiles import Profile, decode, physical
+from screwkin.servo.profiles import decode, physical
 from screwkin.servo.roundtrip import RoundTrip, latency_advice, measured_round_trips
 
 _MEASURED = 2  # times before a refusal: a computer that stands still for a moment is no slow adapter
@@ -34,6 +34,7 @@ class Readings:
     def __init__(self, bus: Bus, bounds: Bounds) -> None:
         self.bus, self.bounds = bus, bounds
         self.blocks = [block_of(profile) for profile in bounds.profiles]
+        self.grouped = grouping(bounds.profiles)
         self.budget = budget(bounds.profiles, bus.baud)
         self._queue, self._more = deque(range(len(bounds.ids))), self.budget.more
 
@@ -49,8 +50,10 @@ class Readings:
     def values(self, k: int, reply: Reply) -> dict[str, float]:
         """The values of a servo's block in SI; the torque registers as they are."""
         profile = self.bounds.profiles[k]
-        start, _, names = self.blocks[k]
-        raw = {name: _register(profile, name, reply.data, start) for name in names}
+        raw = {
+            name: int.from_bytes(reply.data[at : at + profile.register(name).width], "little")
+            for name, at in self.blocks[k].places.items()
+        }
         values = {
             name.removeprefix("present_"): physical(profile, name, number)
             for name, number in raw.items()
@@ -92,22 +95,47 @@ class Readings:
         )
 
     def _answers_take(self) -> tuple[RoundTrip, float]:
-        """Times of single answers, and of a further one in a frame [s]."""
-        ids, grouped = self.bounds.ids, grouping(self.bounds.profiles)
-        start, length, _ = self.blocks[0]
+        """Times of single answers, and of a further one in a frame [s], asked for as quickly as can be."""
+        ids = self.bounds.ids
         try:
+            self._agree()
+            start, length, _ = self.blocks[0]
             trip = measured_round_trips(self.bus, ids, start, length)
-            if grouped == "none":
+            if self.grouped == "none":
                 return trip, trip.most
             began = self.bus.clock.now()
             for _ in range(_GROUPS):
-                self.bus.read_many(ids, start, length, grouped)
+                self.bus.read_many(ids, start, length, self.grouped)
             lasted = (self.bus.clock.now() - began) / _GROUPS
         except LineLostError as error:
             raise SafetyError(f"the servos cannot be asked: {error}") from None
         except BusError as error:
             raise SafetyError(f"the servos are not ready: {error}") from None
         return trip, min(max((lasted - trip.median) / (len(ids) - 1), _LEAST), trip.most)
+
+    def _agree(self) -> None:
+        """Read from now on in the quickest way that all servos know, by their model and firmware.
+
+        Torque registers that stand far from the measurements are read along by indirect addresses.
+
+        Raises:
+            BusError: one does not answer. LineLostError: the port is gone.
+        """
+        profile = self.bounds.profiles[0]
+        if self.grouped != "sync" or not (profile.indirect or profile.fast_sync_read):
+            return
+        register = profile.register("firmware")
+        firmware = min(self.bus.read(id, register.address, register.width).value for id in self.bounds.ids)
+        if profile.fast_sync_read and firmware >= profile.fast_sync_read:
+            self.grouped = "fast"
+        block, shadows = indirect_block(profile), profile.indirect
+        if block and shadows and firmware >= shadows.firmware:
+            rows = [profile.register(name) for name in block.places]
+            named = [place for row in rows for place in range(row.address, row.end)]
+            data = b"".join(place.to_bytes(2, "little") for place in named)
+            for id in self.bounds.ids:
+                self.bus.write(id, shadows.addresses, int.from_bytes(data, "little"), len(data))
+            self.blocks = [block] * len(self.blocks)
 
     def torque_is_read(self) -> bool:
         """Whether the torque limit is among what is read of every servo."""
@@ -126,9 +154,8 @@ class Readings:
         Raises:
             LineLostError: the port is gone.
         """
-        grouped = grouping(self.bounds.profiles)
-        if grouped != "none":
-            self._read_group(grouped, due, taken, lost)
+        if self.grouped != "none":
+            self._read_group(due, taken, lost)
             return
         again: list[int] = []
         for count in range(len(self._queue)):
@@ -146,7 +173,7 @@ class Readings:
                 lost(k)
         self._queue.extendleft(reversed(again))
 
-    def _read_group(self, grouped: Grouped, due: float, taken: Taken, lost: Callable[[int], None]) -> None:
+    def _read_group(self, due: float, taken: Taken, lost: Callable[[int], None]) -> None:
         """Read as many in one packet as fit, by what that took last time."""
         now, usual = self.bus.clock.now, self.budget.read
         began = now()
@@ -157,7 +184,7 @@ class Readings:
         chosen = [self._queue[i] for i in range(min(1 + int(spare / self._more), len(self._queue)))]
         self._queue.rotate(-len(chosen))
         ids = [self.bounds.ids[k] for k in chosen]
-        replies = self.bus.read_many(ids, start, length, grouped)
+        replies = self.bus.read_many(ids, start, length, self.grouped)
         if len(ids) > 1:
             self._more = max(self.budget.more, (now() - began - usual) / (len(ids) - 1))
         for k, id in zip(chosen, ids, strict=True):
@@ -165,8 +192,3 @@ class Readings:
                 taken(k, replies[id])
             else:
                 lost(k)
-
-
-def _register(profile: Profile, name: str, data: bytes, start: int) -> int:
-    register = profile.register(name)
-    return int.from_bytes(data[register.address - start : register.end - start], "little")

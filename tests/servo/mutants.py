@@ -53,8 +53,8 @@ TESTS: dict[str, tuple[str, ...]] = {
     "player": ("test_player", "test_guardian"),
 }
 """The tests of each file, the quickest first."""
-LIMIT = {"player": 400}
-"""Seconds of processor after which a fault counts as noticed, and is named a timeout; 60 by default."""
+LIMIT = {"player": 400, "packets": 60}
+"""Seconds of processor after which a fault counts as noticed, and is named a timeout; 20 by default."""
 PATIENCE = 3600.0
 """Seconds of the clock after which the same is true of one that waits for ever."""
 
@@ -215,7 +215,7 @@ def outcome(mutant: Mutant) -> tuple[str, str]:
         if process == 0:
             os.dup2(said.fileno(), 1)
             os.dup2(said.fileno(), 2)
-            limit = LIMIT.get(mutant.file, 60)
+            limit = LIMIT.get(mutant.file, 20)
             resource.setrlimit(resource.RLIMIT_CPU, (limit, limit))
             os._exit(_tested(mutant))
         status = _waited(process)

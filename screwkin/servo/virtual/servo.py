@@ -263,7 +263,7 @@ class VirtualServo:
     def _places_of(self, address: int, length: int) -> list[int]:
         """Where the bytes at an address are, those of indirect data where their addresses say."""
         places, shadows = list(range(address, address + length)), self.profile.indirect
-        if shadows is None:
+        if shadows is None or self.get("firmware") < shadows.firmware:
             return places
         for k, place in enumerate(places):
             if 0 <= (n := place - shadows.data) < shadows.count:
