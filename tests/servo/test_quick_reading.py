@@ -137,7 +137,7 @@ def test_the_budget_of_an_answer_that_all_share_is_what_its_bytes_take():
     ],
 )
 def test_a_play_that_reads_so_notices_what_any_play_notices(injected, kinds):
-    """Torque that goes off, far from the measurements in the table; silence; a reset, that forgets the rest."""
+    """Torque that goes off, far from the measurements in the table; silence; a reset, which forgets more."""
     robot, line, bus = fitted("XM430-W350")
     if injected:
         line.inject(injected)
