@@ -129,6 +129,9 @@ def bus_faults(table: Mapping[str, Any]) -> Iterator[Fault]:
     if isinstance(bus, Mapping) and bool(bus.get("modes")) != ("operating_mode" in rows):
         fix = "Write both modes and the register operating_mode, or neither"
         yield Fault("[bus]", "modes", f"is {bus.get('modes')!r}", fix)
+    for key, name in (("indirect", "firmware"), ("fast_sync_read", "firmware"), ("unlocked_to_last", "lock")):
+        if isinstance(bus, Mapping) and bus.get(key) and name not in rows:
+            yield Fault("[registers]", name, f"is missing, and [bus] has {key}", f"Write {name}, or no {key}")
 
 
 def _section_faults(

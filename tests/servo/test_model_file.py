@@ -102,6 +102,12 @@ def test_a_users_file_may_also_hold_the_motor(mine):
             "modes = { joint = 3 }",
             r"key modes: is \{'joint': 3\}. Write both modes and the register",
         ),
+        ("reads = []", "unlocked_to_last = 1", "key unlocked_to_last: is 1. Write true or false"),
+        (
+            "reads = []",
+            "indirect = { addresses = 168 }",
+            "key indirect: .* Write addresses, data, count; and",
+        ),
         ("reads = []", "modes = { fly = 3 }", "key modes: .* Write joint and others of joint, wheel"),
         (
             "address = 3, width = 1",
@@ -139,6 +145,23 @@ def test_every_fault_is_named_by_file_key_value_and_what_would_be_right(mine, ol
     with pytest.raises(TableError, match=named) as refused:
         load_profile(str(mine))
     assert str(mine) in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("key", "name"),
+    [
+        ("fast_sync_read = 45", "firmware"),
+        ("indirect = { addresses = 168, data = 224, count = 28 }", "firmware"),
+        ("unlocked_to_last = true", "lock"),
+    ],
+)
+def test_what_needs_a_register_says_which(mine, key, name):
+    text = MINE.replace("reads = []", key)
+    mine.write_text(text, encoding="utf-8")
+    load_profile(str(mine))
+    mine.write_text(text.replace(f"\n{name} = {{", f"\nother_{name} = {{"), encoding="utf-8")
+    with pytest.raises(TableError, match=rf"\[registers\], key {name}: is missing, and \[bus\] has"):
+        load_profile(str(mine))
 
 
 def test_all_faults_are_listed_at_once(mine):
