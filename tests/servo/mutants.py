@@ -49,8 +49,8 @@ TESTS: dict[str, tuple[str, ...]] = {
     "watch": ("test_watch",),
     "leave": ("test_leave",),
     "packets": ("test_packets", "test_bus"),
-    "bus": ("test_bus", "test_leave"),
-    "player": ("test_player", "test_guardian"),
+    "bus": ("test_bus", "test_leave", "test_quick_reading"),
+    "player": ("test_player", "test_play_stops", "test_guardian"),
 }
 """The tests of each file, the quickest first."""
 LIMIT = {"player": 400, "packets": 60}

@@ -8,9 +8,11 @@ import termios
 import pytest
 
 from screwkin.errors import InputError, ScrewkinError
+from screwkin.servo import protocol1
 from screwkin.servo.bus import Bus, open_line
 from screwkin.servo.line import BusError, LineLostError, PortError, RefusedError, Reply
 from screwkin.servo.profiles import load_profile
+from screwkin.servo.protocol2 import joined_status
 from screwkin.servo.virtual.bus import SimulatedClock, VirtualBus
 from screwkin.servo.virtual.servo import VirtualServo
 
@@ -192,6 +194,46 @@ def test_a_sync_read_of_ft_scs_is_the_published_packet_and_who_is_silent_is_aske
     assert line.sent == ["FF FF FE 06 82 38 08 01 02 36", "FF FF 02 04 02 38 08 B7"]
     assert {id: reply.data for id, reply in found.items()} == {1: bytes.fromhex("00 08 00 00 00 00 79 1E")}
     assert (bus.statistics.exchanges, bus.statistics.failed) == (3, 2), "both tries with servo 2"
+    assert len(bus.statistics.recent) == 1
+
+
+def joined(*answers: tuple[int, int, bytes]) -> bytes:
+    return joined_status(len(answers), 4, answers)
+
+
+def test_a_fast_sync_read_is_answered_in_one_packet():
+    line = Recorded(joined((1, 0, b"\xa6\0\0\0"), (2, 0x80, b"\x1f\x08\0\0")))
+    line.time = 5.0
+    bus = bus_on(line, 2.0)
+    found = bus.read_many([1, 2], 132, 4, "fast")
+    assert [packet.split(" ")[7] for packet in line.sent] == ["8A"]
+    assert {id: (reply.value, reply.errors) for id, reply in found.items()} == {
+        1: (166, frozenset()),
+        2: (2079, {"hardware"}),
+    }
+    counts = bus.statistics
+    assert (counts.exchanges, counts.failed, len(counts.recent)) == (1, 0, 1)
+    assert counts.longest < 0.1
+
+
+@pytest.mark.parametrize("ids", [(1, 9), (2, 1)])
+def test_a_packet_of_other_servos_is_no_answer_to_a_fast_sync_read(ids):
+    """Then each is asked as by an older servo, and at last alone."""
+    line = Recorded(joined(*((id, 0, bytes(4)) for id in ids)))
+    bus = bus_on(line, 2.0, retries=0)
+    assert bus.read_many([1, 2], 132, 4, "fast") == {}
+    assert [packet.split(" ")[7] for packet in line.sent] == ["8A", "82", "02", "02"]
+    assert (bus.statistics.exchanges, bus.statistics.failed) == (4, 4)
+
+
+@pytest.mark.parametrize(("id", "is_one"), [(-1, False), (0, True), (252, True), (253, False), (254, False)])
+def test_ids_are_those_that_a_servo_can_have(id, is_one):
+    line = Recorded(protocol1.status(id, 0, b"\x20") if is_one else b"")
+    if is_one:
+        assert bus_on(line).read(id, 0x2B, 1).value == 0x20
+    else:
+        with pytest.raises(InputError, match=f"invalid servo id {id}; expected 0 to 252"):
+            bus_on(line).read(id, 0x2B, 1)
 
 
 def test_a_group_of_one_is_asked_as_one():
@@ -259,7 +301,8 @@ def test_an_answer_to_a_ping_is_waited_for_however_long_the_bus_has_been_silent(
 
 def test_statistics_count_exchanges_and_time_those_that_succeed():
     line = Recorded("FF FF 01 03 00 20 DB", "FF FF 01 03 00 20 DC", "FF FF 01 03 00 20 DC", "", "")
-    bus, counts = bus_on(line, patience=0.25), None
+    line.time = 5.0
+    bus = bus_on(line, patience=0.25)
     assert bus.patience == 0.25
     bus.read(1, 0x2B, 1)
     for _ in range(2):
@@ -268,7 +311,7 @@ def test_statistics_count_exchanges_and_time_those_that_succeed():
     counts = bus.statistics
     assert (counts.exchanges, counts.retries, counts.failed) == (3, 2, 2)
     assert (counts.corrupt, counts.silent, len(counts.recent)) == (2, 2, 1)
-    assert counts.longest < 0.25 < line.time
+    assert counts.longest < 0.25 < line.time - 5.0
 
 
 def test_a_bulk_read_asks_all_in_one_packet():

@@ -164,7 +164,7 @@ def test_a_greatest_speed_of_so_many_units_is_written_as_these():
 
 def test_one_packet_carries_goal_and_speed_of_all_servos():
     bus = Recorder()
-    Gate(bus, Bounds.of(BIOLOID)).goals(np.zeros(18))
+    assert Gate(bus, Bounds.of(BIOLOID)).goals(np.zeros(18)).tolist() == [512] * 18
     [(address, data)] = bus.packets
     assert address == 30
     assert sorted(data) == list(range(1, 19))
