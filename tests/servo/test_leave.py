@@ -125,7 +125,8 @@ def test_servos_that_hold_are_not_told_again_because_of_one_that_does_not_answer
 @pytest.mark.parametrize("state", ["hold", "limp"])
 def test_a_line_that_carries_nothing_for_a_while_is_opened_anew_until_all_confirm(state, share, kind):
     rig = Rig(InjectedFault(kind, until=2.0, share=share))
-    opened = []
+    opened, closed = [], []
+    rig.line.close = lambda: closed.append(rig.clock.now())
 
     def anew() -> Bus:
         opened.append(rig.clock.now())
@@ -135,6 +136,7 @@ def test_a_line_that_carries_nothing_for_a_while_is_opened_anew_until_all_confir
     assert rig.clock.now() < 2.5
     assert {servo.torque_on for servo in rig.line.servos} == {state == "hold"}
     assert len(opened) > 1 or share < 1
+    assert len(closed) == len(opened), "each is given back before the next is opened"
 
 
 def test_a_line_that_carries_nothing_for_good_is_unknown_after_some_seconds():

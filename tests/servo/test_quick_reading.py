@@ -31,7 +31,8 @@ def planned(model, firmware=None, rate=50.0):
 def read(readings):
     """What one frame reads, by joint."""
     values, missing = {}, []
-    readings.read(0.0, 50.0, lambda k, reply: values.update({k: readings.values(k, reply)}), missing.append)
+    due = readings.bus.clock.now() + 0.02
+    readings.read(due, lambda k, reply: values.update({k: readings.values(k, reply)}), missing.append)
     assert missing == []
     return values
 
