@@ -105,7 +105,8 @@ def closed_form(chain: SerialChain, position: bool = False, family: str | None =
     fitting = [row for row in rows if row.joints == n and chain.turning.all()]
     what = f"{chain.limb} has no closed form" + (" for positions" if position else "")
     if not fitting:
-        kinds = f"{n} joints" + ("" if chain.turning.all() else ", not all revolute")
+        mixed = ", some coupled" if chain.gears else "" if chain.turning.all() else ", not all revolute"
+        kinds = f"{n} joints{mixed}"
         needed = " or ".join(_COUNTS.get(j, str(j)) for j in sorted({row.joints for row in rows}))
         raise InputError(f"{what}: it has {kinds}; {needed} revolute joints are needed. Use a numeric method")
     lacks = []

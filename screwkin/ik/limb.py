@@ -56,6 +56,9 @@ def limb_ik(
         free: rotations of the tip that need not be met, out of ``rx ry rz``, in the order in which they turn
             it about its own axes: what a limb of fewer than six joints has to leave open. NumPy arrays only.
 
+    Of a limb with coupled joints the joints are those that lead, one of them beside its way perhaps; their
+    limits are those that the coupled ones leave them. Numeric methods solve it.
+
     Returns:
         LimbSolutions: ``.q`` (..., branches, n) best first, ``.valid .in_limits .residual .iterations``
         (..., branches), ``.status`` (...,), ``.best`` (..., n), ``.path()``. Where loops run through the
@@ -83,7 +86,7 @@ def limb_ik(
     """
     if method not in get_args(Method):
         raise InputError(f"method is {method!r}; valid: {', '.join(get_args(Method))}")
-    chain = SerialChain.of(robot, limb)
+    chain = SerialChain.of(robot, limb, coupled=True)
     _refuse_joined(robot, chain.limb)
     settings, start = settings or DEFAULT, resting(robot, chain) if guess is None else guess
     solve = _linked_ik if limb_linkages(robot, limb) else _free_ik
@@ -135,12 +138,13 @@ def _free_ik(
     if is_jax(T_base_tip) or is_jax(start):
         from screwkin.ik.implicit import limb_in_jax
 
+        SerialChain.of(robot, chain.limb)  # which refuses coupled joints
         refuse_free_in_jax(free)
         return limb_in_jax(chain, T_base_tip, method, start, settings, least_squares)
     if not free or np.shape(T_base_tip)[-2:] != (4, 4):
         return solve_limb_arrays(chain, T_base_tip, method, start, settings, least_squares)
     start = of_shape("guess", start, len(chain.names))
-    longer = SerialChain.of(robot, chain.limb, checked_free(free))
+    longer = SerialChain.of(robot, chain.limb, checked_free(free), coupled=True)
     start = np.concatenate([start, np.zeros((*start.shape[:-1], len(free)))], axis=-1)
     solutions = solve_limb_arrays(longer, T_base_tip, method, start, settings, least_squares)
     own = solutions.q[..., : len(chain.names)]

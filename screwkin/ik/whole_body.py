@@ -75,7 +75,7 @@ def solve_whole_body(
         flat[name] = np.broadcast_to(target, (*batch, *shape)).reshape(count, *shape)
     base = flat.pop("base")
     limbs = [
-        (name, SerialChain.of(robot, name, open_.get(name, ()) if target.ndim == 3 else ()), target)
+        (name, SerialChain.of(robot, name, open_.get(name, ()) if target.ndim == 3 else (), True), target)
         for name, target in flat.items()
     ]
     parts: dict[str, Array] = {
@@ -102,7 +102,7 @@ def _apart(robot: Robot, tips: tuple[str, ...]) -> list[list[int]]:
     """Which tips are solved together, as their limbs share joints."""
     shared = np.zeros((len(tips), len(robot.joints)), dtype=np.int64)
     for row, tip in enumerate(tips):
-        shared[row, list(SerialChain.of(robot, tip).joints)] = 1
+        shared[row, list(SerialChain.of(robot, tip, coupled=True).joints)] = 1
     return [rows for rows, _ in components(shared)]
 
 

@@ -39,7 +39,10 @@ P = ParamSpec("P")
 T = TypeVar("T")
 SMALLEST = 1e-3
 """Least size of a limb [m]."""
-COUPLED = "use close_loops of its closed_mechanism, which solves positions of coupled joints"
+COUPLED = "use limb_ik of NumPy arrays, solve_pose, or close_loops, which solve positions of coupled joints"
+
+Gear = tuple[int, float, float]
+"""Of a joint on the way: the place of what moves it among ``joints``, the ratio and the offset."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +60,7 @@ class SerialChain:
         turning: (n,) bool, False for prismatic and helical joints, whose positions are not wrapped.
         length: size of the limb [m], the way from axis to axis to the tip; it makes positions comparable
             with angles.
+        gears: for every screw what moves it, where joints are coupled; empty where each has its own position.
     """
 
     limb: str
@@ -68,6 +72,7 @@ class SerialChain:
     upper: Array
     turning: Array
     length: float
+    gears: tuple[Gear, ...] = ()
     memo: dict[Hashable, Any] = field(default_factory=dict, init=False, repr=False)
 
     def __reduce__(self) -> Any:
@@ -75,7 +80,7 @@ class SerialChain:
         return SerialChain, tuple(getattr(self, f.name) for f in fields(self) if f.init)
 
     @classmethod
-    def of(cls, robot: Robot, limb: str, free: tuple[str, ...] = ()) -> SerialChain:
+    def of(cls, robot: Robot, limb: str, free: tuple[str, ...] = (), coupled: bool = False) -> SerialChain:
         """The chain of a limb, by its name or its tip's.
 
         Args:
@@ -83,12 +88,16 @@ class SerialChain:
             limb: the limb.
             free: rotations of the tip that are free, see ``freed``; their virtual joints have places in q
                 behind those of all joints, three to a limb.
+            coupled: whether joints may be coupled: those of the chain are then the ones that lead.
 
         Raises:
             UnknownNameError: no such limb.
-            InputError: one of its joints is coupled to another joint.
+            InputError: one of its joints is coupled to another joint, and none may be.
         """
-        name = robot.limb(limb).name
+        chosen = robot.limb(limb)
+        name = chosen.name
+        if not coupled:
+            refuse_coupled(robot, robot.path_to(chosen.link), f"the serial chain of {name}", COUPLED)
         return _freed_chain(robot, name, free) if free else _chain(robot, name)
 
     def freed(self, free: tuple[str, ...], places: Sequence[int]) -> SerialChain:
@@ -111,7 +120,22 @@ class SerialChain:
             lower=np.concatenate([self.lower, -ends]),
             upper=np.concatenate([self.upper, ends]),
             turning=np.concatenate([self.turning, ends > 0]),
+            gears=self.gears and (*self.gears, *((len(self.joints) + k, 1.0, 0.0) for k in range(len(free)))),
         )
+
+    def thetas(self, q: Sequence[Scalar]) -> list[Scalar]:
+        """Positions of all screws from those of the joints that lead."""
+        if not self.gears:
+            return list(q)
+        return [q[place] * ratio + offset for place, ratio, offset in self.gears]
+
+    @property
+    def gearing(self) -> Array:
+        """(screws, joints): rates of all screws per unit rate of every joint that leads."""
+        G = np.zeros((len(self.screws), len(self.joints)))
+        for row, (place, ratio, _) in enumerate(self.gears):
+            G[row, place] = ratio
+        return G if self.gears else np.eye(len(self.screws))
 
     @property
     def reversed(self) -> SerialChain:
@@ -182,13 +206,16 @@ def _levers(screws: Sequence[Screw], tip: Vector) -> list[float]:
 def _chain(robot: Robot, limb: str) -> SerialChain:
     chosen = robot.limb(limb)
     path = robot.path_to(chosen.link)
-    refuse_coupled(robot, path, f"the serial chain of {chosen.name}", COUPLED)
-    joints = [robot.joints[i] for i in path]
-    lower, upper = (end[list(path)] for end in limits.limits_of(robot))
-    turning = np.array([joint.type == "revolute" for joint in joints], dtype=bool)
+    leading = tuple(dict.fromkeys(robot.gears[i][0] for i in path))
+    gears = _gears(robot, path, leading) if max(path, default=0) >= len(robot.joints) else ()
+    joints = [robot.joints[i] for i in leading]
+    lower, upper = (end[list(leading)] for end in limits.limits_of(robot))
+    several = {place for place, *_ in gears if [one for one, *_ in gears].count(place) > 1}
+    own = [k not in several and leading[k] in path for k in range(len(leading))]
+    turning = np.array([j.type == "revolute" and one for j, one in zip(joints, own, strict=True)], dtype=bool)
     for array in (lower, upper, turning):
         array.flags.writeable = False
-    screws = nearest_points([joint.screw for joint in joints], chosen.frame.p)
+    screws = nearest_points([robot.tree[i].screw for i in path], chosen.frame.p)
     places = [*(screw.s0 for screw in screws), chosen.frame.p]
     size = sum(_number(norm(b - a)) for a, b in pairwise(places))
     sliding = [joint.screw.is_translation for joint in joints]
@@ -196,14 +223,25 @@ def _chain(robot: Robot, limb: str) -> SerialChain:
     return SerialChain(
         chosen.name,
         tuple(joint.name for joint in joints),
-        path,
+        leading,
         screws,
         chosen.frame,
         lower,
         upper,
         turning,
         max(SMALLEST, size),
+        gears,
     )
+
+
+def _gears(robot: Robot, path: Sequence[int], leading: Sequence[int]) -> tuple[Gear, ...]:
+    """What moves every joint on a way."""
+    count, gears = len(robot.joints), []
+    for i in path:
+        leader, ratio = robot.gears[i]
+        offset = float(robot.coupled[i - count].offset) if i >= count else 0.0
+        gears.append((leading.index(leader), float(ratio), offset))
+    return tuple(gears)
 
 
 @kept
@@ -322,8 +360,10 @@ def residual(chain: SerialChain, q: Array, target: Array) -> tuple[Array, Array]
         Jacobian (B, 6, n), rows [omega; v of the tip's origin]. For positions the last three rows only.
     """
     count = (len(q),)
-    tip, columns = forward(chain.screws, unstack(q), chain.tip)
+    tip, columns = forward(chain.screws, chain.thetas(unstack(q)), chain.tip)
     J = as_array([at(tip.p, column) for column in columns], count).swapaxes(1, 2)
+    if chain.gears:
+        J = J @ chain.gearing
     if target.ndim == 2:
         return target - as_array(tip.p, count), J[:, 3:]
     wanted = pose_from_array(target)
