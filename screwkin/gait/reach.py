@@ -13,6 +13,7 @@ from screwkin.algebra.screws import at
 from screwkin.algebra.se3 import Pose, as_array, pose_from_array, rotation_log, unstack
 from screwkin.errors import LimitError, UnreachableError
 from screwkin.gait.plan import Plan
+from screwkin.ik.linked import beside
 from screwkin.ik.pose import solve_pose
 from screwkin.ik.pose_solution import PoseSolution
 from screwkin.kinematics.landmarks import limb_root, waist_frame
@@ -137,7 +138,8 @@ def _refuse_other_branch(
     other = np.flatnonzero(on_other_branch(robot, targets, solution, limb, free))
     if not len(other):
         return
-    path, start = list(robot.path_to(limb.link)), np.array(robot.posture("home").q, dtype=float)
+    path = [*robot.path_to(limb.link), *beside(robot, limb.name)]
+    start = np.array(robot.posture("home").q, dtype=float)
     sample, joints, endless = int(other[0]), limited_joints(robot), np.inf
     one = {name: target[sample] for name, target in targets.items()}
     unlimited = replace(
