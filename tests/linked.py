@@ -13,7 +13,7 @@ from screwkin.model.library import find_robot
 from screwkin.model.robot import Robot
 from screwkin.model.table import parse_robot
 
-BUNDLED = ("linkages/knee-parallelogram", "linkages/parallel-ankles")
+BUNDLED = ("linkages/knee-parallelogram", "linkages/parallel-ankles", "linkages/tarsus-legs")
 KNEES = find_robot("linkages/knee-parallelogram").read_text(encoding="utf-8")
 
 FLAT_AT_90 = KNEES.replace('bar_angle = "-60*deg"', 'bar_angle = "0*deg"')

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from screwkin.algebra.se3 import as_array, unstack
+from screwkin.algebra.se3 import as_array
 from screwkin.errors import InputError
 from screwkin.ik.all_branches import by_relative, has_branches
 from screwkin.ik.closed import recognised
@@ -18,6 +18,7 @@ from screwkin.ik.methods import solve_limb
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.relative import relative
 from screwkin.ik.starts import box, spread
+from screwkin.ik.tied import limb_chain
 from screwkin.kinematics.serial_chain import SerialChain, forward
 from screwkin.mechanism.linkages import limb_linkages
 from screwkin.model.robot import Robot
@@ -59,7 +60,7 @@ def ik_classes(robot: Robot) -> tuple[IkClass, ...]:
 
 def _class_of(robot: Robot, limb: str) -> IkClass:
     try:
-        chain, linked = SerialChain.of(robot, limb), bool(limb_linkages(robot, limb))
+        chain, linked = limb_chain(robot, limb), bool(limb_linkages(robot, limb))
     except InputError as error:
         return IkClass(limb, "pose", str(error), 0, float("nan"), 0)
     position = len(chain.joints) <= 3
@@ -70,7 +71,7 @@ def _class_of(robot: Robot, limb: str) -> IkClass:
         whole, gap = completed_limb(robot, chain, q)
         q = q[(gap == 0) & linked_chain(robot, chain).within(whole)]
     poses = len(q)
-    tips = as_array(forward(chain.screws, unstack(q), chain.tip)[0], (poses,))
+    tips = as_array(forward(chain.screws, chain.moved(q)[0], chain.tip)[0], (poses,))
     target = tips[:, :3, 3] if position else tips
     guess = np.tile(resting(robot, chain), (poses, 1))
     found = solve_limb(chain, target, "auto", guess, IkSettings(), (poses,))

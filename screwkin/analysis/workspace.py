@@ -22,6 +22,7 @@ from screwkin.errors import InputError
 from screwkin.ik.limb import resting
 from screwkin.ik.limb_map import limb_map
 from screwkin.ik.reach import OUT_OF_REACH, REACHABLE, cause_names, reach
+from screwkin.ik.tied import refuse_tied
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.model.robot import Robot
 
@@ -110,6 +111,7 @@ def workspace(
         InputError: the limb has too few joints, heights or resolution make no grid.
         UnknownNameError: no such limb.
     """
+    refuse_tied(robot, robot.limb(limb).name, "workspace")
     chain = SerialChain.of(robot, limb)
     if len(chain.joints) < 6:
         raise InputError(

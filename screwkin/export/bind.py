@@ -60,6 +60,10 @@ def bind(robot: Robot, *quantities: Choice, optional: Sequence[str] = ()) -> Bou
     return Bound(robot, [_named(robot, choice, optional) for choice in quantities])
 
 
+WHEN_ASKED = ("forward_dynamics",)
+"""Quantities that are prepared only by name."""
+
+
 def prepare(robot: Robot, *quantities: Choice) -> None:
     """Compile what plain calls of quantities compute, so that from now on they run machine code.
 
@@ -68,8 +72,9 @@ def prepare(robot: Robot, *quantities: Choice) -> None:
     Args:
         robot: n joints.
         quantities: as for ``bind``, and ``limb_ik solve_pose secondary_rates walk workspace``; default: all
-            that the robot has. Of a frame or limb without a choice: all tips or limbs. Arguments with a
-            default are prepared both ways, all left out and all given.
+            that the robot has but ``forward_dynamics``, which takes longer than the others together. Of a
+            frame or limb without a choice: all tips or limbs. Arguments with a default are prepared both
+            ways, all left out and all given.
 
     Example:
         >>> import screwkin as sk
@@ -90,7 +95,7 @@ def prepare(robot: Robot, *quantities: Choice) -> None:
             for chosen in every:
                 subject, definition, given, choices, _ = _named(robot, (name, *chosen), optional)
                 definition.door(subject, given, choices).prepare()
-    for name in () if quantities else (*QUANTITIES, *ALGORITHMS):
+    for name in () if quantities else (n for n in (*QUANTITIES, *ALGORITHMS) if n not in WHEN_ASKED):
         with suppress(InputError):  # a robot without limbs or masses has fewer
             prepare(robot, name)
 

@@ -146,6 +146,7 @@ def _chosen(robot: Robot, limb: Limb, home: Array) -> tuple[int, ...]:
     others |= {
         robot.gears[k][0] for one in robot.limbs for k in robot.path_to(one.link) if k >= len(robot.joints)
     }
+    others |= {i for one in linkages(robot) for i in one.path if i not in one.imposed}  # they follow
     own = [i for i in robot.path_to(limb.link) if i < len(robot.joints) and i not in others]
     if limb.kind == "leg":
         count = min(POSE, len(own))

@@ -16,6 +16,7 @@ from screwkin.ik.methods import Method, solve_limb_arrays
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.solutions import LimbSolutions
 from screwkin.ik.system import checked_free, refuse_free_in_jax
+from screwkin.ik.tied import limb_chain
 from screwkin.kinematics.arrays import of_shape
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.holds import joined_tips
@@ -86,7 +87,7 @@ def limb_ik(
     """
     if method not in get_args(Method):
         raise InputError(f"method is {method!r}; valid: {', '.join(get_args(Method))}")
-    chain = SerialChain.of(robot, limb, coupled=True)
+    chain = limb_chain(robot, limb)
     _refuse_joined(robot, chain.limb)
     settings, start = settings or DEFAULT, resting(robot, chain) if guess is None else guess
     solve = _linked_ik if limb_linkages(robot, limb) else _free_ik
@@ -144,7 +145,7 @@ def _free_ik(
     if not free or np.shape(T_base_tip)[-2:] != (4, 4):
         return solve_limb_arrays(chain, T_base_tip, method, start, settings, least_squares)
     start = of_shape("guess", start, len(chain.names))
-    longer = SerialChain.of(robot, chain.limb, checked_free(free), coupled=True)
+    longer = limb_chain(robot, chain.limb, checked_free(free))
     start = np.concatenate([start, np.zeros((*start.shape[:-1], len(free)))], axis=-1)
     solutions = solve_limb_arrays(longer, T_base_tip, method, start, settings, least_squares)
     own = solutions.q[..., : len(chain.names)]

@@ -100,7 +100,7 @@ def loop_residual(robot: Robot, closures: Sequence[Closure], q: Array) -> tuple[
     for k, closure in enumerate(closures):
         ends = []
         for sign, path, frame in zip((1, -1), _sides(robot, closure), _frames(closure), strict=True):
-            screws, thetas = [robot.tree[i].screw for i in path], _thetas(robot, path, q)
+            screws, thetas = [robot.tree[i].screw for i in path], tree_thetas(robot, path, q)
             end, columns = forward(screws, thetas, frame)
             ends.append((sign, path, end, columns))
         a, b = ends[0][2], ends[1][2]
@@ -122,7 +122,7 @@ def _frames(closure: Closure) -> tuple[Pose, Pose]:
     return closure.frame_a, closure.frame_b
 
 
-def _thetas(robot: Robot, path: Sequence[int], q: Array) -> list[Array]:
+def tree_thetas(robot: Robot, path: Sequence[int], q: Array) -> list[Array]:
     """Positions (B,) of the joints on a way through the tree."""
     count = len(robot.joints)
     return [

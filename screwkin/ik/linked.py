@@ -23,9 +23,9 @@ from screwkin.model.state import reference_posture
 
 
 def beside(robot: Robot, limb: str) -> tuple[int, ...]:
-    """Indices in q of the joints of a limb's linkages that are not on the way to its tip."""
+    """Indices in q of the joints of a limb's linkages that follow, or are not on the way to its tip."""
     parts = limb_linkages(robot, limb)
-    return tuple(i for linkage in parts for i in linkage.joints if i not in linkage.path)
+    return tuple(i for one in parts for i in one.joints if i not in one.path or i not in one.imposed)
 
 
 def linked_chain(robot: Robot, chain: SerialChain) -> SerialChain:

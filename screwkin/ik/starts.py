@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.algebra.se3 import as_array, unstack
+from screwkin.algebra.se3 import as_array
 from screwkin.ik.system import System
 from screwkin.kinematics.serial_chain import SerialChain, forward
 
@@ -47,7 +47,7 @@ def later_starts(system: System, guess: Array, number: int) -> Array:
         own = [k for k in columns if use[k] == 1]
         x[..., own] = spread(len(own), POINTS, number)
         q = (low + x * (high - low))[..., columns].reshape(-1, len(columns))
-        tips = as_array(forward(chain.screws, chain.thetas(unstack(q)), chain.tip)[0], (len(q),))
+        tips = as_array(forward(chain.screws, chain.moved(q)[0], chain.tip)[0], (len(q),))
         features = _features(tips if target.ndim == 3 else tips[:, :3, 3], system.length)
         offset, wanted = (features**2).sum(axis=1) / 2, _features(target, system.length)
         nearest.append(np.empty(far.shape, dtype=int))

@@ -21,6 +21,7 @@ from screwkin.ik.methods import solve_limb
 from screwkin.ik.numeric import IkSettings, arrived, solve_system
 from screwkin.ik.pose_solution import PoseSolution
 from screwkin.ik.system import System
+from screwkin.ik.tied import limb_chain
 from screwkin.kinematics import limits
 from screwkin.kinematics.arrays import checked, exact_target
 from screwkin.kinematics.serial_chain import SerialChain
@@ -75,7 +76,7 @@ def solve_whole_body(
         flat[name] = np.broadcast_to(target, (*batch, *shape)).reshape(count, *shape)
     base = flat.pop("base")
     limbs = [
-        (name, SerialChain.of(robot, name, open_.get(name, ()) if target.ndim == 3 else (), True), target)
+        (name, limb_chain(robot, name, open_.get(name, ()) if target.ndim == 3 else ()), target)
         for name, target in flat.items()
     ]
     parts: dict[str, Array] = {
@@ -102,7 +103,7 @@ def _apart(robot: Robot, tips: tuple[str, ...]) -> list[list[int]]:
     """Which tips are solved together, as their limbs share joints."""
     shared = np.zeros((len(tips), len(robot.joints)), dtype=np.int64)
     for row, tip in enumerate(tips):
-        shared[row, list(SerialChain.of(robot, tip, coupled=True).joints)] = 1
+        shared[row, list(limb_chain(robot, tip).joints)] = 1
     return [rows for rows, _ in components(shared)]
 
 

@@ -129,13 +129,16 @@ class SerialChain:
             return list(q)
         return [q[place] * ratio + offset for place, ratio, offset in self.gears]
 
-    @property
-    def gearing(self) -> Array:
-        """(screws, joints): rates of all screws per unit rate of every joint that leads."""
+    def moved(self, q: Array) -> tuple[list[Scalar], Array | None]:
+        """Positions of all screws, and their rates per unit rate of every joint; None where both agree.
+
+        Args:
+            q: (B, joints).
+        """
         G = np.zeros((len(self.screws), len(self.joints)))
         for row, (place, ratio, _) in enumerate(self.gears):
             G[row, place] = ratio
-        return G if self.gears else np.eye(len(self.screws))
+        return self.thetas(unstack(q)), G if self.gears else None
 
     @property
     def reversed(self) -> SerialChain:
@@ -360,10 +363,11 @@ def residual(chain: SerialChain, q: Array, target: Array) -> tuple[Array, Array]
         Jacobian (B, 6, n), rows [omega; v of the tip's origin]. For positions the last three rows only.
     """
     count = (len(q),)
-    tip, columns = forward(chain.screws, chain.thetas(unstack(q)), chain.tip)
+    thetas, rates = chain.moved(q)
+    tip, columns = forward(chain.screws, thetas, chain.tip)
     J = as_array([at(tip.p, column) for column in columns], count).swapaxes(1, 2)
-    if chain.gears:
-        J = J @ chain.gearing
+    if rates is not None:
+        J = J @ rates
     if target.ndim == 2:
         return target - as_array(tip.p, count), J[:, 3:]
     wanted = pose_from_array(target)

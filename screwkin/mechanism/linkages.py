@@ -125,18 +125,18 @@ def crossed_linkages(robot: Robot, limb: str) -> tuple[Linkage, ...]:
 
 
 def limb_linkages(robot: Robot, limb: str) -> tuple[Linkage, ...]:
-    """The same, where the joints on the limb's way are free of one another, so that others follow them.
+    """The same, where they are the limb's own.
 
     Raises:
-        InputError: a loop ties joints of the limb to one another, or to those of another limb.
+        InputError: a loop ties joints of the limb to those of another limb.
     """
     crossed, name = crossed_linkages(robot, limb), robot.limb(limb).name
     for linkage in crossed:
         others = [one for one in robot.limbs if set(_way(robot, one.link)) & set(linkage.joints)]
-        if len(others) > 1 or not set(linkage.path) <= set(linkage.imposed):
+        if len(others) > 1:
             raise InputError(
-                f"{robot.name} has closures ({linkage.name}) that tie joints of {name} to one another or to "
-                "another limb's, and inverse kinematics takes them as free; use close_loops"
+                f"{robot.name} has closures ({linkage.name}) that tie joints of {name} to another limb's, "
+                "and inverse kinematics takes them as free; use close_loops"
             )
     return crossed
 

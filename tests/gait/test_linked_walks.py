@@ -15,7 +15,10 @@ def test_a_motor_of_60_degrees_is_honoured_by_walks() -> None:
     """The motor turns with the knee: steps low and short enough pass unchanged, others name the motor."""
     free = sk.load_robot("linkages/knee-parallelogram")
     robot = free.replace(limits={"right_knee_motor": (-LIMIT, LIMIT)})
-    gait, motors = sk.load_gait("walk"), [free.joint_names.index(f"{s}_knee_motor") for s in ("right", "left")]
+    gait, motors = (
+        sk.load_gait("walk"),
+        [free.joint_names.index(f"{s}_knee_motor") for s in ("right", "left")],
+    )
     with pytest.raises(LimitError, match=r"right_knee_motor at \d+.\d deg, limits -60.0 to 60.0 deg"):
         sk.walk(robot, gait, 2)
     assert np.abs(sk.walk(free, gait, 2).q[:, motors]).max() > LIMIT
