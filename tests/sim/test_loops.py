@@ -15,6 +15,11 @@ from screwkin.sim.mujoco import MuJoCoBackend
 from screwkin.sim.pybullet import PyBulletBackend
 from tests.linked import BUNDLED, flat_at_90, gaps
 
+GAITS = {
+    "flat": {"lift": 0.012},
+    "linkages/tarsus-legs": {"lift": 0.015, "stride": 0.1, "waist_height": 0.165},
+}
+"""What the default gait is changed to: shorter legs, or knees that may not come to a right angle."""
 ENGINES = {"mujoco": MuJoCoBackend, "pybullet": PyBulletBackend}
 
 
@@ -45,7 +50,7 @@ def test_urdf_refuses_loops_by_name() -> None:
 @pytest.mark.parametrize("name", [*BUNDLED, "flat"])
 def test_six_steps_pass_in_both_engines(name: str) -> None:
     robot = flat_at_90() if name == "flat" else sk.load_robot(name)
-    gait = sk.load_gait("walk").replace(lift=0.012 if name == "flat" else 0.03)
+    gait = sk.load_gait("walk").replace(**GAITS.get(name, {}))
     walk = sk.walk(robot, gait, 6)
     verdict = sk.validate(robot, walk)
     assert verdict.passed
