@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from screwkin.gait.balance import Balance, zmp
     from screwkin.gait.files import load_gait
     from screwkin.gait.fitting import fitting_gait
+    from screwkin.gait.goals import steps_along, steps_to
+    from screwkin.gait.joined import join
     from screwkin.gait.listed import footsteps
     from screwkin.gait.record import Gait
     from screwkin.gait.walk import walk
@@ -62,6 +64,8 @@ _HOMES = {
     "gait.balance": "Balance zmp",
     "gait.files": "load_gait",
     "gait.fitting": "fitting_gait",
+    "gait.goals": "steps_along steps_to",
+    "gait.joined": "join",
     "gait.listed": "footsteps",
     "gait.record": "Gait",
     "gait.walk": "walk",
@@ -115,6 +119,7 @@ __all__ = [
     "home",
     "inverse_dynamics",
     "jacobian",
+    "join",
     "joint_rates",
     "least_rates",
     "limb_ik",
@@ -133,6 +138,8 @@ __all__ = [
     "solve_pose",
     "static_deflection",
     "static_forces",
+    "steps_along",
+    "steps_to",
     "tip_poses",
     "validate",
     "virtual_motion",

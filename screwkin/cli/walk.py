@@ -13,13 +13,14 @@ from screwkin.analysis.account import Account, account_of
 from screwkin.anatomy.humanoid import anatomy
 from screwkin.cli.compensated import CompensateBy, Passes, ServoStiffness, compensated, remedy
 from screwkin.cli.folder import output_folder
-from screwkin.cli.options import AsJson, OutputFolder, RobotName, settings
+from screwkin.cli.options import AsJson, OutputFolder, RobotName, numbers_of, settings
 from screwkin.cli.output import aligned, drawn, print_json, progress_bar, remark
 from screwkin.errors import InputError
 from screwkin.files import atomic_write
 from screwkin.gait.files import default_gait, load_gait
 from screwkin.gait.fitting import fitting_gait
-from screwkin.gait.listed import load_footsteps, with_footsteps
+from screwkin.gait.goals import load_curve, steps_along, steps_to
+from screwkin.gait.listed import Footsteps, load_footsteps, with_footsteps
 from screwkin.gait.record import Gait
 from screwkin.gait.walk import walk as walk_of
 from screwkin.gait.write import gait_toml
@@ -40,7 +41,16 @@ def walk(
     steps: Annotated[int | None, typer.Option(help="Number of steps; default: the gait's.")] = None,
     list_of_steps: Annotated[
         Path | None,
-        typer.Option("--footsteps", metavar="FILE", help="A CSV file of footholds: x, y [m], yaw [rad]."),
+        typer.Option(
+            "--footsteps", metavar="FILE", help="A CSV file of footholds: x, y [m], yaw [rad], perhaps z [m]."
+        ),
+    ] = None,
+    goals: Annotated[
+        list[str] | None,
+        typer.Option("--goal", metavar="X,Y,YAW", help="Go there [m, rad], and on to the next if repeated."),
+    ] = None,
+    curve: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="A CSV file of points to follow: x, y [m].")
     ] = None,
     assignments: Annotated[
         list[str] | None,
@@ -62,7 +72,8 @@ def walk(
 
     With --compensate also compensated/trajectory.npz, the commands for compliant servos, beside the plan.
     Exit code 3 if a limb cannot reach, is singular or beyond a limit; the message names limb and time. A ZMP
-    outside the support polygon is a warning; the trajectory is written all the same.
+    outside the support polygon is a warning; the trajectory is written all the same. Walks over footsteps, to
+    goals and along curves begin and end at home (--set lead=0: they do not).
     """
     table = load_robot(robot)
     if auto and not table.limbs:
@@ -71,12 +82,13 @@ def walk(
     assignments = [*(assignments or []), *([] if com is None else [f"com={com}"])]
     if auto and gait is not None:
         raise InputError("--auto chooses the gait; leave --gait out")
-    name = gait or (default_gait(table.name) if list_of_steps is None else stepping_gait(table.name))
-    chosen = changed(fitting_gait(table), assignments, rate) if auto else chosen_gait(name, assignments, rate)
-    if list_of_steps is not None:
-        chosen = with_footsteps(chosen, load_footsteps(list_of_steps))
+    where = _where_to(list_of_steps, goals or [], curve)
+    name = gait or (stepping_gait(table.name) if where else default_gait(table.name))
+    chosen = changed(fitting_gait(table) if auto else load_gait(name), assignments, rate)
+    if where:
+        chosen = with_footsteps(chosen, _steps(table, chosen, list_of_steps, goals or [], curve))
     steps = chosen.steps if steps is None else steps
-    command = command_of(robot, None if auto else name, steps, assignments, rate, list_of_steps)
+    command = command_of(robot, None if auto else name, steps, assignments, rate, where)
     with output_folder(output, "walk", table.name) as folder:
         account, remedied = _planned(table, chosen, steps, command), None
         if wanted is not None:
@@ -101,9 +113,39 @@ def walk(
 
 
 def stepping_gait(robot: str) -> str:
-    """The gait that steps onto listed footholds if none is chosen: the robot's own, if its kind can."""
+    """The gait that steps onto listed footholds if none is chosen: the robot's own, if its kind can.
+
+    Bundled gaits of robots' own follow their feet; the gait of all others is moved by key points.
+    """
     own = default_gait(robot)
-    return own if load_gait(own).kind != "geometric" else "auto"
+    return "auto" if own == default_gait("") else own
+
+
+def _where_to(footsteps: Path | None, goals: Sequence[str], curve: Path | None) -> list[str]:
+    """The words of the command line that say where a walk goes; none: as the gait does.
+
+    Raises:
+        InputError: several ways of saying so.
+    """
+    ways = {"--footsteps": footsteps, "--goal": goals, "--curve": curve}
+    given = [option for option, value in ways.items() if value]
+    if len(given) > 1:
+        raise InputError(f"{' and '.join(given)} each say where the walk goes; give one of them")
+    if goals:
+        return [f"--goal={goal}" for goal in goals]
+    return [word for option in given for word in (option, str(ways[option]))]
+
+
+def _steps(
+    robot: Robot, gait: Gait, footsteps: Path | None, goals: Sequence[str], curve: Path | None
+) -> Footsteps:
+    """The list of footsteps that the command line asks for."""
+    if footsteps is not None:
+        return load_footsteps(footsteps)
+    if curve is not None:
+        return steps_along(robot, gait, load_curve(curve))
+    write = "two lengths in m and an angle in rad, as 0.5,0.2,1.57"
+    return steps_to(robot, gait, *(numbers_of(goal, "--goal", (3,), "goal", write) for goal in goals))
 
 
 def chosen_gait(name: str, assignments: Sequence[str], rate: float | None) -> Gait:
@@ -140,11 +182,11 @@ def command_of(
     steps: int,
     assignments: Sequence[str],
     rate: float | None,
-    footsteps: Path | None = None,
+    where: Sequence[str] = (),
 ) -> str:
     """The command line that plans the same trajectory again, wherever its files go."""
     words = ["screwkin", "walk", robot, *(["--auto"] if gait is None else ["--gait", gait])]
-    words += ["--steps", str(steps), *([] if footsteps is None else ["--footsteps", str(footsteps)])]
+    words += ["--steps", str(steps), *where]
     words += [word for text in assignments for word in ("--set", text)]
     words += [] if rate is None else ["--rate", f"{rate:g}"]
     return shlex.join(words)

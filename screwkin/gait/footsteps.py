@@ -50,7 +50,7 @@ def swing_side(gait: Gait, step: int) -> int:
 
 def listed_step(gait: Gait, time: float) -> int:
     """Index of the listed foothold that a foot is on its way to at a time [s], within the list."""
-    return min(max(int(time / gait.Tc) - 1, 0), len(gait.places) - 1)
+    return min(max(int((time - gait.lead) / gait.Tc) - 1, 0), len(gait.places) - 1)
 
 
 def footholds(gait: Gait, stance: Stance, steps: int) -> tuple[Foothold, ...]:

@@ -11,7 +11,9 @@ from screwkin.gait.splines import cyclic_cubic
 from screwkin.gait.stance import Stance
 
 
-def hands_motion(gait: Gait, stance: Stance, waist: Motion, phase: Motion) -> dict[str, Motion]:
+def hands_motion(
+    gait: Gait, stance: Stance, waist: Motion, phase: Motion, home: Motion | None = None
+) -> dict[str, Motion]:
     """World motion (T, 3) of every hand by name; positions only.
 
     ``hand_forward`` [m] moves the hand on the side of the swinging foot, and the other one oppositely
@@ -24,6 +26,7 @@ def hands_motion(gait: Gait, stance: Stance, waist: Motion, phase: Motion) -> di
         stance: hands at home, in the waist frame [m].
         waist: x, y, z, yaw (T, 4) in the world [m and rad].
         phase: (T,) [steps].
+        home: how much (T,) they are where they are at home; the phase rests while they go there.
     """
     swing, lift = (_channel(gait, name, phase) for name in ("hand_forward", "hand_raise"))
     none = swing * 0.0
@@ -31,8 +34,18 @@ def hands_motion(gait: Gait, stance: Stance, waist: Motion, phase: Motion) -> di
     for hand in stance.hands:
         x, y, z = hand.shoulder
         own = together(swing * (hand.side * first_side(gait)), none, lift)
-        motions[hand.name] = carried_point(waist, own + np.array([x, y, z - gait.hand_drop]))
+        own += np.array([x, y, z - gait.hand_drop])
+        motions[hand.name] = carried_point(
+            waist, own if home is None else _drawn(own, home, x, y, z - hand.drop)
+        )
     return motions
+
+
+def _drawn(own: Motion, home: Motion, *place: float) -> Motion:
+    """Between its own place (T, 3) and that at home, where the own one rests while the share (T,) changes."""
+    away = np.array(place) - own.value
+    share, rate, acceleration = (x[:, None] for x in (home.value, home.rate, home.acceleration))
+    return Motion(own.value + share * away, own.rate + rate * away, own.acceleration + acceleration * away)
 
 
 def _channel(gait: Gait, name: str, phase: Motion) -> Motion:

@@ -10,8 +10,11 @@ from pathlib import Path
 from typing import Any, cast
 
 from screwkin.errors import Fault, GaitError, InputError, near
+from screwkin.gait.footsteps import footholds
+from screwkin.gait.lead import LEAD, SAME, beside
 from screwkin.gait.places import HEIGHT, KEYS, StepEnd, read_places
 from screwkin.gait.record import CHOICES, Gait, Side, gait_from_dict
+from screwkin.gait.stance import Stance
 from screwkin.model.toml import read_text
 
 FOOT = "foot"
@@ -108,23 +111,54 @@ def load_footsteps(path: str | Path) -> Footsteps:
 
 
 def with_footsteps(gait: Gait, steps: Footsteps) -> Gait:
-    """The gait that steps onto listed footholds and is in all else as given.
+    """The gait that steps onto listed footholds, from home to home, and is in all else as given.
 
     Args:
-        gait: of kind ``preview`` or ``footsteps``: the waist of others follows key points, not the feet.
+        gait: of kind ``preview`` or ``footsteps``: the waist of others follows key points, not the feet. Its
+            ``lead`` is 1 s where it says nothing.
         steps: from ``footsteps`` or ``load_footsteps``.
 
     Raises:
         GaitError: a gait of another kind.
     """
+    check_follows_feet(gait)
+    document = gait.to_dict()
+    document["gait"] = {"lead": LEAD, **document["gait"], "kind": "footsteps", "first": steps.first}
+    document["foothold"] = [place.to_dict() for place in steps.places]
+    return gait_from_dict(document, gait.path)
+
+
+def check_follows_feet(gait: Gait) -> None:
+    """Refuse a gait that does not go where its feet are set.
+
+    Raises:
+        GaitError: its kind is ``geometric``.
+    """
     if gait.kind == "geometric":
         found = "a gait of kind 'geometric' moves its waist by key points, wherever the feet are"
         fix = 'Give one of kind "preview" or "footsteps"'
         raise GaitError(gait.path or f"gait {gait.name}", [Fault("[gait]", "kind", found, fix)])
+
+
+def closed(gait: Gait, stance: Stance, steps: int) -> tuple[Gait, int]:
+    """The gait of so many steps of a list, and one more where it ends at home but its feet do not stand so.
+
+    Args:
+        gait: fitted to the robot; others than lists, and those without ``lead``, stay as they are.
+        stance: of the robot.
+        steps: of the list that are walked.
+    """
+    if not (gait.places and gait.lead) or steps > len(gait.places):
+        return gait, steps
+    holds = footholds(gait, stance, steps)
+    last = next(hold for hold in reversed(holds) if hold.foot != holds[-1].foot)
+    place = beside(stance, holds)
+    apart = (last.x - place.x, last.y - place.y, last.z - place.z, last.yaw - place.yaw)
     document = gait.to_dict()
-    document["gait"] |= {"kind": "footsteps", "first": steps.first}
-    document["foothold"] = [place.to_dict() for place in steps.places]
-    return gait_from_dict(document, gait.path)
+    document["foothold"] = document["foothold"][:steps]
+    if max(map(abs, apart)) > SAME:
+        document["foothold"].append(place.to_dict())
+    return gait_from_dict(document, gait.path), len(document["foothold"])
 
 
 def _row(i: int, place: Any) -> dict[str, Any]:

@@ -40,7 +40,9 @@ def levels(holds: tuple[Foothold, ...]) -> Array:
     return np.array(lower)
 
 
-def waist_over(gait: Gait, heading: Array, level: Array, cart: CartMotion, phase: Motion) -> Motion:
+def waist_over(
+    gait: Gait, heading: Array, level: Array, cart: CartMotion, phase: Motion, raised: Motion
+) -> Motion:
     """Waist x, y, z, yaw (T, 4): over the cart, and by a quintic in each step to its next heading and level.
 
     Args:
@@ -49,13 +51,14 @@ def waist_over(gait: Gait, heading: Array, level: Array, cart: CartMotion, phase
         level: of the ground there (steps + 1,) [m].
         cart: T samples.
         phase: (T,) [steps].
+        raised: added to its height (T,) [m].
     """
     turning, rising = (along(_stepwise(values), phase) for values in (heading, level))
     rising += gait.waist_height
     return Motion(
-        np.column_stack([cart.com, rising.value, turning.value]),
-        np.column_stack([cart.velocity, rising.rate, turning.rate]),
-        np.column_stack([cart.acceleration, rising.acceleration, turning.acceleration]),
+        np.column_stack([cart.com, rising.value + raised.value, turning.value]),
+        np.column_stack([cart.velocity, rising.rate + raised.rate, turning.rate]),
+        np.column_stack([cart.acceleration, rising.acceleration + raised.acceleration, turning.acceleration]),
     )
 
 

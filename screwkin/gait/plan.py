@@ -113,6 +113,7 @@ def plan_around(
     waist: Motion,
     boundaries: Array,
     notes: tuple[str, ...] = (),
+    home: Motion | None = None,
 ) -> Plan:
     """The plan whose waist moves as given, x, y, z, yaw (T, 4), with feet and hands by the gait's phase (T,).
 
@@ -125,6 +126,7 @@ def plan_around(
         waist: x, y, z, yaw (T, 4) of the waist in the world [m and rad].
         boundaries: (steps + 1,) [s].
         notes: what the reader of the plan should know.
+        home: how much (T,) the hands are where they are at home.
 
     Raises:
         GaitError: a swing below the floor, or numbers too large. NoSolutionError: the feet overlap, or run
@@ -133,7 +135,7 @@ def plan_around(
     with np.errstate(all="ignore"):
         holds = footholds(gait, stance, steps)
         feet, contact = feet_motion(gait, stance, holds, phase)
-        hands = hands_motion(gait, stance, waist, phase)
+        hands = hands_motion(gait, stance, waist, phase, home)
     _check_finite(gait, {"waist": waist, **feet, **hands})
     with np.errstate(all="ignore"):
         gap = check_soles(gait, stance, feet, time)

@@ -24,6 +24,7 @@ from screwkin.dynamics.terrain import Terrain
 from screwkin.errors import Fault, GaitError, InputError, NoSolutionError
 from screwkin.gait.balance import ground_reaction
 from screwkin.gait.footsteps import Foothold, footholds, swing_side
+from screwkin.gait.lead import at_home, led, samples_of, share_of_home
 from screwkin.gait.motion import Motion
 from screwkin.gait.over_feet import headings, levels, waist_over
 from screwkin.gait.plan import Plan, check_fitted, check_rate, plan_around, whole_steps
@@ -54,7 +55,7 @@ def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -
         steps: number of swings, at least 1.
 
     Returns:
-        Plan of (steps + 2) Tc rate samples.
+        Plan of (steps + 2) Tc rate samples, and ``lead`` rate more on either side, from home to home.
 
     Raises:
         InputError: more steps than the gait lists. GaitError: a setting is missing or wrong.
@@ -66,23 +67,27 @@ def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -
         raise InputError(f"steps is {steps}; gait {gait.name} lists {len(gait.places)} footholds")
     settings = _settings(gait)
     check_rate(gait)
-    count = round((steps + 2) * gait.Tc * gait.rate)
-    time = np.arange(count) / gait.rate
-    phase = _phase(time, gait.Tc, steps)
+    count, more = round((steps + 2) * gait.Tc * gait.rate), samples_of(gait)
+    time = np.arange(count + 2 * more) / gait.rate
+    phase = _phase(time - more / gait.rate, gait.Tc, steps)
     holds = footholds(gait, stance, steps)
-    reference = zmp_reference(gait, stance, holds, steps, time)
+    reference = zmp_reference(gait, stance, holds, steps, time[:count])
     heading, level = headings(gait, holds, steps), levels(holds)
-    boundaries = gait.Tc * np.arange(1.0, steps + 2.0)
+    boundaries = gait.Tc * np.arange(1.0, steps + 2.0) + more / gait.rate
+    home = share_of_home(more, count, gait.rate)
 
     def around(cart: CartMotion, part: slice = slice(None)) -> Plan:
         now = Motion(phase.value[part], phase.rate[part], phase.acceleration[part])
-        waist = waist_over(gait, heading, level, cart, now)
-        return plan_around(gait, stance, steps, time[part], now, waist, boundaries)
+        near = Motion(home.value[part], home.rate[part], home.acceleration[part])
+        waist = waist_over(gait, heading, level, cart, now, near * above)
+        return plan_around(gait, stance, steps, time[part], now, waist, boundaries, home=near)
 
+    ends = [at_home(mechanism.robot, stance, stood, gait) for stood in (holds[:2], holds)] if more else []
+    above = ends[0].height - gait.waist_height if ends else 0.0
     height = gait.waist_height
     if gait.com == "true":
         rest = np.zeros((1, 2))
-        standing = around(CartMotion(reference[:1], rest, rest, reference[:1]), slice(1))
+        standing = around(CartMotion(reference[:1], rest, rest, reference[:1]), slice(more, more + 1))
         stand, q = _followed(mechanism, standing, reference[:1])
         height = _com(mechanism.robot, stand, q)[0, 2]
     normal = Terrain(gait.uphill, gait.upleft).R[2]  # the vertical in the floor's axes
@@ -91,6 +96,9 @@ def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -
     )
     # On a slope the CoM stands further uphill: above the foot, not along its normal.
     cart = follow_reference(gains, reference + height / normal[2] * normal[:2])
+    if ends:
+        start, end = (one.com if gait.com == "true" else one.waist for one in ends)
+        cart = led(cart, start, end, more, gait.rate)
     planned = around(cart)
     if gait.com == "waist":
         return replace(planned, notes=("the waist is taken for the CoM",))

@@ -54,7 +54,7 @@ NUMBERS: Mapping[str, float | None] = {
 }
 """Parameters that are numbers, with their defaults; None: the file must say it."""
 
-OPTIONAL: Mapping[str, float] = {"uphill": 0.0, "upleft": 0.0, "roll": 0.0}
+OPTIONAL: Mapping[str, float] = {"uphill": 0.0, "upleft": 0.0, "roll": 0.0, "lead": 0.0}
 """Further numbers, with their defaults; a gait records those only that are given."""
 
 FLAT = (*TEXTS, *CHOICES, *NUMBERS, *OPTIONAL)
@@ -76,6 +76,7 @@ class Gait:
     by default. rate: samples per second. arms: ``follow`` their hands, or ``rest``
     at home. uphill, upleft: angles by which the floor rises ahead, along x, and then to the left. roll: how
     far the wanted ZMP goes from the middle of a sole to where the other foot leaves, then to where it lands.
+    lead: time from home into the walk and out of it, 0 for none.
     footholds: ``alternate`` (each foot passes the other),
     ``close`` (one leads, the other closes up) or ``parallel`` (as alternate, but from feet side by side to
     feet side by side); first: the foot that swings first. com: what a preview gait steers, the ``true`` CoM
@@ -115,6 +116,7 @@ class Gait:
     uphill: float = 0.0
     upleft: float = 0.0
     roll: float = 0.0
+    lead: float = 0.0
     path: str = ""
     _document: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
@@ -317,7 +319,7 @@ def _numbers(
         fault if fault.key in (*NUMBERS, *OPTIONAL) else _moved(fault, "[parameters]") for fault in wrong
     ]
     numbers = {name: None if value is None else float(value) for name, value in values.items()}
-    for key in (*_POSITIVE, "ramp", "roll"):
+    for key in (*_POSITIVE, "ramp", "roll", "lead"):
         value, least = numbers.get(key), "above 0" if key in _POSITIVE else "at least 0"
         known = lengths or key not in relative
         if known and value is not None and (value < 0 or (value == 0 and key in _POSITIVE)):

@@ -38,12 +38,13 @@ class Foot:
 class Hand:
     """A hand: name of its tip, side, and the point (x, y, z) above it at home, as high as its shoulder [m].
 
-    In the waist frame.
+    In the waist frame. drop: how far below that point it is at home [m].
     """
 
     name: str
     side: int
     shoulder: tuple[float, float, float]
+    drop: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -113,7 +114,8 @@ def stance_of(robot: Robot) -> Stance:
             places.append(abs(float(tip.y)))
         else:
             x, y = (round(float(c), DIGITS) + 0.0 for c in (tip.x, tip.y))
-            hands.append(Hand(limb.tip, side, (x, y, float((back @ limb_root(robot, limb.name)).z))))
+            z = float((back @ limb_root(robot, limb.name)).z)
+            hands.append(Hand(limb.tip, side, (x, y, z), z - float(tip.z)))
     if sorted(foot.side for foot in feet) != [RIGHT, LEFT]:
         raise InputError(f"robot {robot.name} has {len(feet)} legs; a walk needs one on either side")
     return Stance(sum(places) / len(places), tuple(feet), tuple(hands), back)

@@ -14,10 +14,12 @@ from screwkin.files import text_sha256, versions
 from screwkin.gait.balance import ground_margin, ground_reaction, soles_on_floor
 from screwkin.gait.follow import Followed, follow
 from screwkin.gait.lengths import fitted
-from screwkin.gait.listed import Footsteps, with_footsteps
+from screwkin.gait.listed import Footsteps, closed, with_footsteps
+from screwkin.gait.plan import whole_steps
 from screwkin.gait.realise import free_rotations
 from screwkin.gait.record import Gait
 from screwkin.gait.remedy import with_remedy
+from screwkin.gait.stance import stance_of
 from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.model.library import ROBOTS, data_folder
 from screwkin.model.robot import Robot, robot_text
@@ -36,7 +38,9 @@ def walk(robot: Robot, gait: Gait, steps: int | Footsteps | None = None, command
             move no limb, or more than one, rest at home.
         gait: from ``load_gait``.
         steps: number of steps, at least 1; default: the gait's own, 8 unless its file says otherwise. Or a
-            list from ``footsteps``, which a gait of kind ``preview`` or ``footsteps`` steps onto.
+            list from ``footsteps``, which a gait of kind ``preview`` or ``footsteps`` steps onto. A gait with
+            ``lead``, which one over a list has unless it says otherwise, begins and ends at home; a list that
+            does not end with the feet side by side then has one step more.
         command: the command line to record in the file.
 
     Returns:
@@ -61,6 +65,8 @@ def walk(robot: Robot, gait: Gait, steps: int | Footsteps | None = None, command
         gait, steps = with_footsteps(gait, steps), len(steps)
     gait = fitted(gait, robot)
     steps = gait.steps if steps is None else steps
+    if gait.places and gait.lead:
+        gait, steps = closed(gait, stance_of(robot), whole_steps(steps))
     try:
         return planned_walk(robot, gait, steps, command)
     except NoSolutionError as error:
