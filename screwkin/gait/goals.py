@@ -63,7 +63,9 @@ def step_limits(robot: Robot, gait: Gait) -> StepLimits:
     return StepLimits(ahead, SHARE * best["side"], SHARE * best["turn"])
 
 
-def steps_to(robot: Robot, gait: Gait, *goals: Sequence[float]) -> Footsteps:
+def steps_to(
+    robot: Robot, gait: Gait, *goals: Sequence[float], limits: StepLimits | None = None
+) -> Footsteps:
     """Footsteps that lead from the start to goals, one after the other, for ``walk(robot, gait, steps)``.
 
     To a near goal the robot steps as it stands; to a far one it turns, walks ahead or back, and turns again,
@@ -73,6 +75,7 @@ def steps_to(robot: Robot, gait: Gait, *goals: Sequence[float]) -> Footsteps:
         robot: with two legs, soles and a ``home`` posture.
         gait: of kind ``preview`` or ``footsteps``; its stride is the longest step.
         goals: (x, y, yaw) of the middle between the feet, x, y [m] and yaw [rad]; the start is (0, 0, 0).
+        limits: of a step; default: ``step_limits`` of robot and gait.
 
     Returns:
         Footsteps.
@@ -99,10 +102,10 @@ def steps_to(robot: Robot, gait: Gait, *goals: Sequence[float]) -> Footsteps:
             walker = walker.fewest(_ways(walker.place, place))
         return walker
 
-    return _listed(robot, gait, reached)
+    return _listed(robot, gait, limits, reached)
 
 
-def steps_along(robot: Robot, gait: Gait, curve: Any) -> Footsteps:
+def steps_along(robot: Robot, gait: Gait, curve: Any, limits: StepLimits | None = None) -> Footsteps:
     """Footsteps along a curve on the floor, for ``walk(robot, gait, steps)``.
 
     Args:
@@ -110,6 +113,7 @@ def steps_along(robot: Robot, gait: Gait, curve: Any) -> Footsteps:
         gait: of kind ``preview`` or ``footsteps``; its stride is the longest step.
         curve: points (n, 2), x and y [m], along which the robot faces ahead, or (n, 3) with the yaw that
             it is to have [rad], between which it goes straight. It first goes to the first point.
+        limits: of a step; default: ``step_limits`` of robot and gait.
 
     Returns:
         Footsteps.
@@ -127,7 +131,9 @@ def steps_along(robot: Robot, gait: Gait, curve: Any) -> Footsteps:
     expect(robot, Robot, "robot", 'load_robot("NAME")')
     expect(gait, Gait, "gait", 'load_gait("NAME")')
     points = _curve(curve)
-    return _listed(robot, gait, lambda walker: walker.fewest(_ways(walker.place, points[0])).along(points))
+    return _listed(
+        robot, gait, limits, lambda walker: walker.fewest(_ways(walker.place, points[0])).along(points)
+    )
 
 
 def load_curve(path: str | Path) -> Array:
@@ -157,8 +163,11 @@ def load_curve(path: str | Path) -> Array:
     return np.array(points, dtype=float).reshape(-1, len(names))
 
 
-def _listed(robot: Robot, gait: Gait, reached: Callable[[Walker], Walker]) -> Footsteps:
-    limits, gait = step_limits(robot, gait), fitted(gait, robot)
+def _listed(
+    robot: Robot, gait: Gait, limits: StepLimits | None, reached: Callable[[Walker], Walker]
+) -> Footsteps:
+    check_follows_feet(gait)
+    limits, gait = limits or step_limits(robot, gait), fitted(gait, robot)
     other: Side = "left" if gait.first == "right" else "right"
     firsts = (gait.first, other)
     walked = [reached(walker_at_start(stance_of(robot), limits, gait.spread, first)) for first in firsts]

@@ -20,7 +20,7 @@ GAP = 0.004
 """Least distance between the soles that steps leave [m]."""
 MOST_STEPS = 1_000
 _PARTS = 24  # of the largest step: how finely paths are divided
-_WINDOW = 4 * _PARTS  # points ahead that a step may reach
+_WINDOW = 2 * _PARTS  # points ahead that a step may reach
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,8 @@ class Walker:
                 x, y, _ = dense[standing]
                 raise NoSolutionError(f"no step leads on from x {x:.3g}, y {y:.3g} m: the feet would overlap")
             at[swing] = landing
-            steps.append(self._foothold(dense[landing], swing))
+            x, y, yaw = map(float, self._foothold(dense[landing], swing))
+            steps.append((x, y, yaw))
             swing = -swing
             if len(steps) > MOST_STEPS:
                 raise NoSolutionError(
@@ -105,12 +106,13 @@ class Walker:
         return convex_hull(np.asarray(foot.sole + foot.body, dtype=float))
 
     def _motion(self, places: Array, side: int) -> Motion:
-        feet = np.array([self._foothold(place, side) for place in places])
-        value = np.column_stack([feet[:, :2], np.zeros(len(feet)), feet[:, 2]])
+        x, y, yaw = self._foothold(places.T, side)
+        value = np.column_stack([x, y, np.zeros(len(places)), yaw])
         return Motion(value, np.zeros_like(value), np.zeros_like(value))
 
-    def _foothold(self, place: Array, side: int) -> tuple[float, float, float]:
-        x, y, yaw = map(float, place)
+    def _foothold(self, place: Array, side: int) -> tuple[Array, Array, Array]:
+        """x, y, yaw of a foot where the middle between the feet is at a place (3, ...)."""
+        x, y, yaw = place
         return x - np.sin(yaw) * side * self.across, y + np.cos(yaw) * side * self.across, yaw
 
     def _divided(self, path: Array) -> Array:

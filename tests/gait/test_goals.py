@@ -59,12 +59,12 @@ def checked(steps: Footsteps) -> np.ndarray:
     return at
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=4, deadline=None)
 @given(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-3.1, 3.1))
 def test_steps_to_any_goal_arrive_there_and_back_home(x: float, y: float, yaw: float) -> None:
     if math.hypot(x, y) + abs(yaw) < 1e-3:
         return
-    steps = sk.steps_to(ROBOT, GAIT, (x, y, yaw), (0.0, 0.0, 0.0))
+    steps = sk.steps_to(ROBOT, GAIT, (x, y, yaw), (0.0, 0.0, 0.0), limits=limits())
     at = checked(steps)
     away = at - [x, y, yaw]
     away[:, 2] = np.angle(np.exp(1j * away[:, 2]))
@@ -74,27 +74,28 @@ def test_steps_to_any_goal_arrive_there_and_back_home(x: float, y: float, yaw: f
 
 
 def test_a_mirrored_goal_has_as_many_steps() -> None:
-    assert len(sk.steps_to(ROBOT, GAIT, (0.2, 0.3, 1.0))) == len(sk.steps_to(ROBOT, GAIT, (0.2, -0.3, -1.0)))
+    one = sk.steps_to(ROBOT, GAIT, (0.2, 0.3, 1.0), limits=limits())
+    assert len(one) == len(sk.steps_to(ROBOT, GAIT, (0.2, -0.3, -1.0), limits=limits()))
 
 
 def test_near_goals_take_few_steps_and_far_ones_are_walked_to_ahead() -> None:
-    ahead, side = limits().ahead, limits().side
-    assert len(sk.steps_to(ROBOT, GAIT, (ahead, 0.0, 0.0))) == 2
-    assert len(sk.steps_to(ROBOT, GAIT, (0.0, side, 0.0))) == 2
-    far = middles(sk.steps_to(ROBOT, GAIT.replace(stride="0.6*leg"), (0.0, 0.8, 0.0)))
-    assert np.abs(far[:, 2]).max() == pytest.approx(math.pi / 2)  # it turns, rather than step sideways
-    back = checked(sk.steps_to(ROBOT, GAIT, (-0.2, 0.0, 0.0)))
+    ahead, side = (limits().ahead, 0.0, 0.0), (0.0, limits().side, 0.0)
+    assert len(sk.steps_to(ROBOT, GAIT, ahead, limits=limits())) == 2
+    assert len(sk.steps_to(ROBOT, GAIT, side, limits=limits())) == 2
+    far = sk.steps_to(ROBOT, GAIT, (0.0, 0.6, 0.0), limits=StepLimits(0.06, 0.02, 0.3))
+    assert np.abs(middles(far)[:, 2]).max() == pytest.approx(math.pi / 2)  # it turns on its way
+    back = checked(sk.steps_to(ROBOT, GAIT, (-0.2, 0.0, 0.0), limits=limits()))
     assert np.abs(back[:, 2]).max() < 1e-9  # backwards
 
 
 def test_steps_along_a_curve_stay_on_it() -> None:
     angle = np.linspace(0.0, 1.5, 9)
-    steps = sk.steps_along(ROBOT, GAIT, 0.6 * np.column_stack([np.sin(angle), 1 - np.cos(angle)]))
+    steps = sk.steps_along(ROBOT, GAIT, 0.6 * np.column_stack([np.sin(angle), 1 - np.cos(angle)]), limits())
     at = checked(steps)
     radius = np.hypot(at[:, 0], at[:, 1] - 0.6)
     assert np.abs(radius - 0.6).max() < 0.003
     np.testing.assert_allclose(at[-1], [0.6 * math.sin(1.5), 0.6 * (1 - math.cos(1.5)), 1.5], atol=0.01)
-    yaws = sk.steps_along(ROBOT, GAIT, [(0.1, 0.0, 0.5), (0.1, 0.1, 0.5)])
+    yaws = sk.steps_along(ROBOT, GAIT, [(0.1, 0.0, 0.5), (0.1, 0.1, 0.5)], limits())
     np.testing.assert_allclose(checked(yaws)[-1], [0.1, 0.1, 0.5], atol=1e-9)
 
 
