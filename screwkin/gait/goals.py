@@ -221,7 +221,7 @@ def _curve(curve: Any) -> Array:
             f"points {int(apart.argmin()) + 1} and {int(apart.argmin()) + 2} of the curve are one"
         )
     along = np.concatenate([[0.0], np.cumsum(apart)])
-    spline = CubicSpline(along, points, bc_type="natural")
+    spline = CubicSpline(along, points)
     s = np.linspace(0.0, along[-1], _POINTS * (len(points) - 1) + 1)
     ahead = spline(s, 1)
     return np.column_stack([spline(s), np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))])
