@@ -9,7 +9,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array, numpy_of
 from screwkin.algebra.scalar import is_jax
-from screwkin.compliance.laws import Spring, checked_springs, spring_deflection
+from screwkin.compliance.laws import Spring, checked_springs, spring_deflections
 from screwkin.compliance.springs import SpringChoice, spring_stiffness
 from screwkin.errors import LimitError, expect
 from screwkin.kinematics import limits
@@ -67,13 +67,13 @@ def compensate(
     k = spring_stiffness(robot, stiffness, [robot.joint_names[i] for i in laws])
     k = np.where(k > 0, k, np.inf)  # of a drive that is not there
     xp = numpy_of(q, load)
-    columns = [
-        spring_deflection(name, laws[i], load[..., i]) if i in laws else load[..., i] / k[..., i]
-        for i, name in enumerate(robot.joint_names)
-    ]
-    batch = np.broadcast_shapes(load.shape[:-1], *(x.shape for x in columns))
-    columns = [xp.broadcast_to(x, batch) for x in columns]
-    commands: Array = q + xp.stack(columns, axis=-1) if columns else q
+    deflection = load / k
+    if laws:
+        named = {robot.joint_names[i]: law for i, law in laws.items()}
+        curved = dict(zip(laws, spring_deflections(named, [load[..., i] for i in laws]), strict=True))
+        columns = [curved.get(i, deflection[..., i]) for i in range(load.shape[-1])]
+        deflection = xp.stack(xp.broadcast_arrays(*columns), axis=-1)
+    commands: Array = q + deflection
     if not is_jax(commands):
         _check_limits(robot, commands)
     return commands

@@ -45,33 +45,49 @@ def spring_effort(law: Any, deflection: Array) -> tuple[Array, Array]:
     return law[piece, 1] + slopes[piece] * (deflection - law[piece, 0]), slopes[piece]
 
 
-def spring_deflection(name: str, law: Any, effort: Array) -> Array:
-    """Deflection (...) at which a law has an effort (...).
+def spring_deflections(laws: Mapping[str, Any], efforts: Sequence[Array]) -> list[Array]:
+    """Deflections (...) at which springs have efforts (...), one for each joint's law.
 
     Raises:
-        LimitError: it is beyond a table's ends. NoSolutionError: a function does not reach it.
+        LimitError: one is beyond a table's ends. NoSolutionError: a function does not reach its effort.
     """
-    if not callable(law):
+    known: dict[str, Array] = {}
+    functions: dict[str, Array] = {}
+    for (name, law), effort in zip(laws.items(), efforts, strict=True):
+        if callable(law):
+            functions[name] = effort
+            continue
         refuse_beyond(name, law[:, 1], effort, "carries")
-        deflection: Array = numpy_of(effort).interp(effort, law[:, 1], law[:, 0])
-        return deflection
-    if is_jax(effort):
-        raise InputError(f"springs[{name!r}] is a function, which is solved in NumPy; give a table of pairs")
-    wanted = np.ravel(np.asarray(effort, dtype=float))
+        known[name] = numpy_of(effort).interp(effort, law[:, 1], law[:, 0])
+    if functions:
+        known |= zip(functions, _solved(laws, functions), strict=True)
+    return [known[name] for name in laws]
+
+
+def _solved(laws: Mapping[str, Any], efforts: Mapping[str, Array]) -> list[Array]:
+    """Deflections of functions, all joints at once: their slopes are the only couplings."""
+    if any(is_jax(effort) for effort in efforts.values()):
+        raise InputError(
+            f"springs of {', '.join(efforts)} are functions, which are solved in NumPy; give tables of pairs"
+        )
+    wanted = np.stack(np.broadcast_arrays(*efforts.values()), axis=-1)
+    flat, names = wanted.reshape(-1, len(efforts)), list(efforts)
 
     def residual(x: Array, at: Array) -> tuple[Array, Array]:
-        here, slope = spring_effort(law, x[:, 0])
+        here = [spring_effort(laws[name], x[:, k]) for k, name in enumerate(names)]
+        effort, slope = (np.stack(columns, axis=-1) for columns in zip(*here, strict=True))
         stiff = np.where(slope > 0, slope, np.nan)
-        return ((wanted[at] - here) / stiff)[:, None], np.ones((len(at), 1, 1))
+        return (flat[at] - effort) / stiff, np.tile(np.eye(len(names)), (len(at), 1, 1))
 
-    solved = newton(residual, np.zeros((len(wanted), 1)), REACHED)
+    solved = newton(residual, np.zeros(flat.shape), REACHED)
     if not (solved.residual <= REACHED).all():
-        worst = wanted[int((~(solved.residual <= REACHED)).argmax())]
+        left, _ = residual(solved.x, np.arange(len(flat)))
+        sample, k = np.unravel_index(np.abs(np.nan_to_num(left, nan=np.inf)).argmax(), left.shape)
         raise NoSolutionError(
-            f"{name} carries {worst:.4g}, and its spring's function does not rise to it from rest; its slope "
-            "must be positive"
+            f"{names[k]} carries {flat[sample, k]:.4g}, and its spring's function does not rise to it from "
+            "rest; its slope must be positive"
         )
-    return solved.x.reshape(np.shape(effort))
+    return list(np.moveaxis(solved.x.reshape(wanted.shape), -1, 0))
 
 
 def refuse_beyond(name: str, ends: Array, values: Any, verb: str) -> None:

@@ -139,8 +139,10 @@ def _by_joint(
     if missing:
         raise InputError(f"no {what} for {', '.join(missing)}; name them, or give a default")
     every = {**dict.fromkeys(robot.joint_names, by_name.get("default")), **by_name}
+    if not any(np.ndim(value) for value in every.values()):
+        return np.array([every[name] for name in robot.joint_names], dtype=float)
     columns = [np.asarray(every[name], dtype=float) for name in robot.joint_names]
     batch = one_batch(
         {f"{what} of {name}": (x, 0) for name, x in zip(robot.joint_names, columns, strict=True)}
     )
-    return np.stack([np.broadcast_to(x, batch) for x in columns], axis=-1) if columns else np.zeros(0)
+    return np.stack([np.broadcast_to(x, batch) for x in columns], axis=-1)
