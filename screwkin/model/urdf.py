@@ -10,6 +10,7 @@ float. Tips and soles are massless links fixed to their bodies.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -27,7 +28,7 @@ from screwkin.algebra.se3 import (
     leaves,
     vector_from_array,
 )
-from screwkin.errors import InputError
+from screwkin.errors import InputError, RobotRemark
 from screwkin.model.inertias import (
     impossible,
     inertia_from_matrix,
@@ -137,6 +138,11 @@ def _document(
     robot: Robot, links: Sequence[Link], fixed: Mapping[str, tuple[str, Pose]], folder: Path | None
 ) -> str:
     _refuse_what_urdf_cannot_say(robot)
+    if bending := [link.name for link in robot.links if link.spring]:
+        text = (
+            f"{robot.name}: URDF has rigid links only, and so do simulators; {', '.join(bending)} would bend"
+        )
+        warnings.warn(f"{text} (static_deflection allows for that)", RobotRemark, stacklevel=3)
     root = ElementTree.Element("robot", name=robot.name)
     frames, colours = urdf_frames(robot), link_colours(robot)
     palette = {WHITE: "white", SLATE: "slate", ORANGE: "orange"}

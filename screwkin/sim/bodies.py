@@ -68,7 +68,8 @@ def bodies_of(robot: Robot) -> tuple[tuple[SimBody, ...], tuple[str, ...]]:
         robot: of numbers.
 
     Returns:
-        Bodies, and one sentence for each kind of change: links merged into the next, links given a mass.
+        Bodies, and one sentence for each kind of change: links merged into the next, links given a mass,
+        links that bend and are rigid here.
     """
     merged = {name for name in robot.link_names if _is_bracket(robot, name)}
     light = {
@@ -87,7 +88,8 @@ def bodies_of(robot: Robot) -> tuple[tuple[SimBody, ...], tuple[str, ...]]:
             continue
         link = floored.get(joint.child, robot.link(joint.child))
         bodies.append(SimBody(link, parent, (*joints, joint), frames[joint.child]))
-    return tuple(bodies), _remarks(sorted(merged), [body.link for body in bodies if body.link.name in light])
+    light_links = [body.link for body in bodies if body.link.name in light]
+    return tuple(bodies), _remarks(sorted(merged), light_links, [x.name for x in robot.links if x.spring])
 
 
 def _is_bracket(robot: Robot, name: str) -> bool:
@@ -110,8 +112,10 @@ def _is_light(link: Link) -> bool:
     return float(link.mass) < LEAST or float(np.linalg.eigvalsh(I)[0]) < LEAST
 
 
-def _remarks(merged: Sequence[str], light: Sequence[Link]) -> tuple[str, ...]:
+def _remarks(merged: Sequence[str], light: Sequence[Link], bending: Sequence[str]) -> tuple[str, ...]:
     remarks = []
+    if bending:
+        remarks.append(f"links that bend are rigid: {', '.join(bending)}")
     if merged:
         remarks.append(f"massless links merged into the next one: {', '.join(merged)}")
     if light:

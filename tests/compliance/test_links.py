@@ -10,7 +10,7 @@ import pytest
 import screwkin as sk
 from screwkin.compliance.cartesian import cartesian_stiffness
 from screwkin.compliance.stiffness import static_deflection
-from screwkin.errors import TableError
+from screwkin.errors import RobotRemark, TableError
 from screwkin.model.records import same_content
 from screwkin.model.robot import robot_text
 
@@ -155,6 +155,15 @@ LIMP = [[float(10 * (i == j) + 20 * (i + j == 1)) for j in range(6)] for i in ra
 def test_a_spring_that_is_none_is_refused_with_what_would_be_right(spring, message):
     with pytest.raises(TableError, match=message):
         beam(spring)
+
+
+def test_urdf_and_simulators_say_that_they_know_rigid_links_only():
+    from screwkin.model.urdf import urdf_from_robot
+    from screwkin.sim.bodies import bodies_of
+
+    with pytest.warns(RobotRemark, match="rigid links only, and so do simulators; bar would bend"):
+        urdf_from_robot(beam())
+    assert "links that bend are rigid: bar" in bodies_of(beam())[1]
 
 
 def test_the_base_link_has_no_spring():
