@@ -27,8 +27,8 @@ def compensate(
 ) -> Array:
     """Positions to command to elastic drives so that the joints stand at the state under their efforts.
 
-    Drive and joint are the ends of a spring: what its effort deflects it is added to the command. What bends in
-    links is not a joint's to undo; ``static_deflection`` says how far frames are from where they should be.
+    Drive and joint are the ends of a spring: what its effort deflects it is added to the command. What bends
+    in links is not a joint's to undo; ``static_deflection`` says how far frames are from where they belong.
 
     Args:
         robot: n joints.
