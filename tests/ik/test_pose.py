@@ -322,9 +322,17 @@ def test_an_unknown_method_is_refused(bioloid):
         sk.solve_pose(bioloid, {"right_foot": np.eye(4)}, method="magic")
 
 
-def test_a_robot_with_loops_of_its_own_is_refused():
+def test_a_point_of_a_four_bars_coupler_is_led():
+    """The crank leads, pin and rocker follow: positions are those of close_loops."""
     robot = load_robot("linkages/four-bar")
     frame = Pose(UNTURNED, Vector(0.1, 0, 0))
     tipped = replace(robot, limbs=(Limb("arm", "arm", "coupler", "point", frame, ("px", "py", "rz")),))
-    with pytest.raises(InputError, match=r"four-bar has closures \(loop\).*use close_loops"):
-        sk.solve_pose(tipped, {"point": [0.1, 0.0, 0.0]})
+    home = sk.home(robot)
+    closed = sk.close_loops(
+        sk.closed_mechanism(robot), home, {"crank": home.q[0] + np.linspace(-0.2, 0.2, 5)}
+    )
+    target = sk.frame_pose(tipped, closed.state, "point")[:, :3, 3]
+    solved = sk.solve_pose(tipped, {"point": target}, home)
+    assert solved.ok
+    np.testing.assert_allclose(solved.state.q, closed.state.q, atol=1e-7)
+    assert not sk.solve_pose(tipped, {"point": [0.4, 0.0, 0.0]}).ok
