@@ -1,14 +1,15 @@
 """A robot read from MJCF: MuJoCo compiles the file, and its bodies at rest are written as URDF and read so.
 
 Includes, defaults and orientations in all their forms are thereby MuJoCo's own. All joint positions are
-MuJoCo's; a body with several joints gets massless links between them. Keyframes are postures. What has no
-place in a table (tendons, connections that close loops, ball joints) is a remark or refused.
+MuJoCo's; a body with several joints gets massless links between them. Keyframes are postures, equalities of
+joints couplings, those of bodies closures. What has no place in a table (tendons, ball joints) is a remark or
+refused.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,11 +18,12 @@ from xml.etree import ElementTree
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.algebra.se3 import pose_from_array
-from screwkin.errors import Fault, TableError, needed_for
+from screwkin.algebra.se3 import IDENTITY, Pose, pose_from_array
+from screwkin.errors import Fault, TableError, UnknownNameError, needed_for
 from screwkin.model.mesh_files import find_mesh
+from screwkin.model.mjcf_loops import is_loop, with_loops
 from screwkin.model.mjcf_size import check_size
-from screwkin.model.records import Posture
+from screwkin.model.records import FLOOR, Posture
 from screwkin.model.robot import Robot
 from screwkin.model.toml_out import robot_toml, rpy_of
 from screwkin.model.urdf_in import UrdfRobot, parse_urdf
@@ -80,7 +82,8 @@ def parse_mjcf(text: str, path: str = "<text>", repair: bool = False) -> UrdfRob
             data.qpos[model.jnt_qposadr[j]] = 0.0
     mujoco.mj_kinematics(model, data)
     root = ElementTree.Element("robot", name=spec.modelname or Path(path).stem)
-    _Writer(model, data, files, notes, root).write()
+    writer = _Writer(model, data, files, notes, root)
+    writer.write()
     read = parse_urdf(ElementTree.tostring(root, encoding="unicode"), path, repair)
     robot = replace(
         read.robot,
@@ -88,6 +91,7 @@ def parse_mjcf(text: str, path: str = "<text>", repair: bool = False) -> UrdfRob
         postures=tuple(_postures(model, read, notes)),
         text="",
     )
+    robot = with_loops(mujoco, model, robot, writer.place_in(read.robot), writer.note)
     own = tuple(f"{note}: {', '.join(names)}" for note, names in notes.items())
     return UrdfRobot(Robot.from_text(robot_toml(robot), path), (*own, *read.remarks))
 
@@ -147,14 +151,28 @@ class _Writer:
         for b in range(1, model.nbody):
             top = model.body_rootid[b]
             if free and top != free[0]:
-                self._note("on the ground beside the robot, left out", self._name(b))
+                self.note("on the ground beside the robot, left out", self._name(b))
                 continue
             self._body(b, floating=b in free)
         for count, what in ((model.ntendon, "tendons"), (model.nflex, "flexible bodies")):
             if count:
-                self._note("left out", what)
+                self.note("left out", what)
 
-    def _note(self, text: str, name: str) -> None:
+    def place_in(self, robot: Robot) -> Callable[[int], tuple[str, Pose] | None]:
+        """Where a body is in the robot that was read: its link, or the floor, and its zero pose."""
+
+        def place(b: int) -> tuple[str, Pose] | None:
+            if not b:
+                return (FLOOR if robot.base == "floating" else robot.base_link), IDENTITY
+            try:
+                return robot.frame(self._name(b))
+            except UnknownNameError:
+                return None
+
+        return place
+
+    def note(self, text: str, name: str) -> None:
+        """Remark on something by its name."""
         self._notes.setdefault(text, []).append(name)
 
     def _name(self, b: int) -> str:
@@ -209,7 +227,7 @@ class _Writer:
         kind = _GEOMS.get(int(model.geom_type[g]))
         T = T_link_body @ _matrix(model.geom_pos[g], _rotation(model.geom_quat[g]))
         if kind is None:
-            self._note("shapes left out, of an unknown kind or without an extent", f"geom {g}")
+            self.note("shapes left out, of an unknown kind or without an extent", f"geom {g}")
             return
         size = model.geom_size[g].tolist()
         given = {
@@ -224,7 +242,7 @@ class _Writer:
             mesh = int(model.geom_dataid[g])
             file = self._files.get(model.mesh(mesh).name)
             if file is None:
-                self._note("meshes that stand in the file itself, left out", model.mesh(mesh).name)
+                self.note("meshes that stand in the file itself, left out", model.mesh(mesh).name)
                 return
             T = T @ np.linalg.inv(_matrix(model.mesh_pos[mesh], _rotation(model.mesh_quat[mesh])))
             words = {"filename": file, "scale": _words(model.mesh_scale[mesh])}
@@ -275,14 +293,16 @@ class _Writer:
         return max(motors, default=1e9) or 1e9
 
     def _couplings(self) -> Iterator[tuple[int, tuple[str, float, float]]]:
-        """Joints that follow others linearly; every other equality is a remark."""
+        """Joints that follow others linearly; loops are closures, every other equality is a remark."""
         model = self._model
         for e in range(model.neq):
             name = model.equality(e).name or f"equality {e}"
             one, two = int(model.eq_obj1id[e]), int(model.eq_obj2id[e])
             c = model.eq_data[e][:5]
+            if is_loop(model, e):
+                continue
             if model.eq_type[e] != _JOINT_EQUALITY or two < 0 or np.abs(c[2:]).max() > _MOTIONLESS:
-                self._note("left out, add a [[closure]] or mimic for it", name)
+                self.note("left out, add a [[closure]] or mimic for it", name)
                 continue
             refs = [float(model.qpos0[model.jnt_qposadr[j]]) for j in (one, two)]
             yield one, (self._joint_name(two), float(c[1]), refs[0] + float(c[0]) - float(c[1]) * refs[1])

@@ -31,7 +31,8 @@ WALKER = """<!-- <robot> --><mujoco model="walker"><compiler angle="degree" mesh
           <geom type="cylinder" size="0.05 0.02" mass="0.5" pos="0 0 -0.05"/></body>
         <body name="toe" pos="0.1 0 0"><joint name="toe" axis="0 1 0"/>
           <geom type="ellipsoid" size="0.05 0.02 0.01" mass="0.1"/></body></body></body></body></worldbody>
-<equality><joint joint1="toe" joint2="slide" polycoef="0.1 2 0 0 0"/><weld name="w" body1="toe" body2="foot"/>
+<equality><joint joint1="toe" joint2="slide" polycoef="0.1 2 0 0 0"/>
+  <joint name="w" joint1="yaw" joint2="roll" polycoef="0 0 1 0 0"/>
 </equality>
 <actuator><motor joint="slide" gear="3" forcelimited="true" forcerange="-2 2"/></actuator>
 <keyframe><key name="home" qpos="0 0 0.75 1 0 0 0 0.1 0.2 0.25 0.3"/>
