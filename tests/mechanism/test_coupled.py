@@ -82,8 +82,6 @@ def test_positions_close_with_coupled_joints():
 @pytest.mark.parametrize(
     "ask",
     [
-        lambda: sk.limb_ik(ARM, "arm", np.eye(4)),
-        lambda: sk.solve_pose(ARM, {"hand": np.eye(4)}, STATE),
         lambda: sk.joint_rates(ARM, STATE, np.zeros(6), {"hand": np.zeros(6)}),
         lambda: symbolic_limb(ARM, "arm"),
     ],
