@@ -1,6 +1,7 @@
 """A gait that fits a robot: how large, quick and bent its steps may be by limits, speeds and torques.
 
-The search goes from large, quick steps on bent legs to small, slow ones on straight legs. Many gaits are
+The search goes from large, quick steps on bent legs to small, slow ones on straight legs; legs without a roll
+axis at the ankle are tried last with a waist that leans (``gait.steering``), in quicker steps. Many gaits are
 tried coarsely in one batch; the first promising ones are planned in full and judged by the model alone.
 """
 
@@ -13,11 +14,14 @@ import numpy as np
 
 from screwkin.errors import NoSolutionError, ScrewkinError, expect
 from screwkin.gait.coarse import Coarse, coarse_walks
+from screwkin.gait.driven import arms_of, driven
 from screwkin.gait.feed_forward import walking_torques
 from screwkin.gait.files import load_gait
 from screwkin.gait.lengths import fitted
+from screwkin.gait.realise import free_rotations
 from screwkin.gait.record import Gait
 from screwkin.gait.walk import planned_walk
+from screwkin.mechanism.choice import closed_mechanism
 from screwkin.model.inertias import inertia_matrix
 from screwkin.model.robot import Robot
 from screwkin.trajectory import Trajectory
@@ -31,6 +35,14 @@ TRIES = (
 """Stride, lift and heights of the hips, in leg lengths: from large steps to small ones on straighter legs."""
 PERIODS = (3.5, 4.5, 6.0)
 """Of a step, in periods of a pendulum as long as the legs over 2 pi."""
+LEANING = (2.0, 1.5, 1.0)
+"""Likewise, of steps with a waist that leans."""
+START = 4.0
+"""Time that a quick walk takes to begin and to end, likewise: for so long the next steps move the CoM."""
+BACK = 0.3
+"""How far ahead of ankles that are too weak for the middle of the sole the ZMP goes, by that."""
+QUICK = (2.5,)
+"""Periods of steps that need less sway, where joints of the hips or ankles cannot turn far enough for it."""
 USE = 0.9
 """Share of a joint's speed and torque that a gait may take."""
 _STEPS = 3
@@ -39,11 +51,15 @@ _SPREAD = 2.0  # leg lengths: radii of gyration beyond it are in other units
 
 @dataclass(frozen=True)
 class _Judged:
-    """A gait planned in full and why it will not do, empty if it does; cut short: there is no such walk."""
+    """A gait planned in full and why it will not do, empty if it does.
+
+    cut_short: there is no such walk; weak: it only asks too much of joints.
+    """
 
     gait: Gait
     reasons: tuple[str, ...]
     cut_short: bool = False
+    weak: bool = False
 
 
 def fitting_gait(robot: Robot) -> Gait:
@@ -67,12 +83,28 @@ def fitting_gait(robot: Robot) -> Gait:
     """
     expect(robot, Robot, "robot", 'load_robot("NAME")')
     base, tried = fitted(load_gait("auto"), robot), list[_Judged]()
-    for period in PERIODS:
-        for gait in _promising(robot, base.replace(period=period)):
+    for paced in _paces(robot, base):
+        for gait in _promising(robot, paced):
             tried.append(_judged(robot, gait))
             if not tried[-1].reasons:
                 return gait
+    for judged in [one for one in tried if one.weak]:
+        again = _judged(robot, judged.gait.replace(ahead=BACK))
+        if not again.reasons:
+            return again.gait
     raise NoSolutionError(_refusal(robot, base, tried))
+
+
+def _paces(robot: Robot, base: Gait) -> Iterator[Gait]:
+    """The gait at several periods, then in quick steps; where no joint keeps soles level, the waist leans.
+
+    Sway and lean grow with the period: the CoM of a slow step has to come over the sole itself.
+    """
+    yield from (base.replace(period=period) for period in PERIODS)
+    free = free_rotations(closed_mechanism(driven(robot, arms_of(robot)).moving))
+    rolls = any("rx" in rotations and "ry" not in rotations for rotations in free.values())
+    lateral, periods = ("lean", LEANING) if rolls else ("shift", QUICK)
+    yield from (base.replace(lateral=lateral, period=p, stand=START / p) for p in periods)
 
 
 def _promising(robot: Robot, base: Gait) -> list[Gait]:
@@ -99,7 +131,8 @@ def _judged(robot: Robot, gait: Gait) -> _Judged:
         trajectory = planned_walk(robot, gait, _STEPS)
     except ScrewkinError as error:
         return _Judged(gait, (str(error),), cut_short=True)
-    return _Judged(gait, (*_unbalanced(trajectory), *_overloaded(robot, trajectory)))
+    unbalanced, overloaded = tuple(_unbalanced(trajectory)), tuple(_overloaded(robot, trajectory))
+    return _Judged(gait, (*unbalanced, *overloaded), weak=bool(overloaded) and not unbalanced)
 
 
 def _unbalanced(trajectory: Trajectory) -> Iterator[str]:

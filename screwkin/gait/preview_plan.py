@@ -1,6 +1,7 @@
 """The plan of a preview gait: a CoM motion for a ZMP that goes from foot to foot, and the waist to give it.
 
-Time falls into phases of Tc: the robot stands in the first and the last one, and swings once in each between.
+Time falls into phases of Tc: the robot stands in the first and the last one (or in ``stand`` of them: quick
+steps need more time to begin), and swings once in each between.
 In the first ``dsp`` of a phase both feet are in contact, while the reference moves linearly to the next
 supporting sole. The CoM is that of all links. It has no fixed place in the waist, so Newton's method solves
 for the waist, for positions, rates and accelerations in turn. Source: Kajita et al. (2003); walking with the
@@ -13,7 +14,8 @@ takes the CoM to stay as high above them as at the start; the ZMP of the walk it
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
+from functools import partial
 
 import numpy as np
 
@@ -32,6 +34,7 @@ from screwkin.gait.preview import CartMotion, follow_reference, preview_gains
 from screwkin.gait.realise import differentiate, positions
 from screwkin.gait.record import Gait
 from screwkin.gait.stance import Stance
+from screwkin.gait.steering import Steering
 from screwkin.kinematics.mass import mass_center
 from screwkin.kinematics.positions import link_displacements
 from screwkin.mechanism.mechanism import Mechanism
@@ -55,7 +58,7 @@ def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -
         steps: number of swings, at least 1.
 
     Returns:
-        Plan of (steps + 2) Tc rate samples, and ``lead`` rate more on either side, from home to home.
+        Plan of (steps + 2 stand) Tc rate samples, and ``lead`` rate more on either side, from home to home.
 
     Raises:
         InputError: more steps than the gait lists. GaitError: a setting is missing or wrong.
@@ -67,13 +70,14 @@ def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -
         raise InputError(f"steps is {steps}; gait {gait.name} lists {len(gait.places)} footholds")
     settings = _settings(gait)
     check_rate(gait)
-    count, more = round((steps + 2) * gait.Tc * gait.rate), samples_of(gait)
+    stand = settings["stand"]
+    count, more = round((steps + 2 * stand) * gait.Tc * gait.rate), samples_of(gait)
     time = np.arange(count + 2 * more) / gait.rate
-    phase = _phase(time - more / gait.rate, gait.Tc, steps)
+    phase = _phase(time - more / gait.rate, gait.Tc, steps, stand)
     holds = footholds(gait, stance, steps)
     reference = zmp_reference(gait, stance, holds, steps, time[:count])
     heading, level = headings(gait, holds, steps), levels(holds)
-    boundaries = gait.Tc * np.arange(1.0, steps + 2.0) + more / gait.rate
+    boundaries = gait.Tc * (np.arange(steps + 1.0) + stand) + more / gait.rate
     home = share_of_home(more, count, gait.rate)
 
     def around(cart: CartMotion, part: slice = slice(None)) -> Plan:
@@ -84,32 +88,76 @@ def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -
 
     ends = [at_home(mechanism.robot, stance, stood, gait) for stood in (holds[:2], holds)] if more else []
     above = ends[0].height - gait.waist_height if ends else 0.0
-    height = gait.waist_height
-    if gait.com == "true":
+    steering, heights, aside = Steering.of(mechanism.robot, gait), (gait.waist_height,) * 2, 1.0
+    if gait.com == "true" or steering.axis is not None:
         rest = np.zeros((1, 2))
         standing = around(CartMotion(reference[:1], rest, rest, reference[:1]), slice(more, more + 1))
-        stand, q = _followed(mechanism, standing, reference[:1])
-        height = _com(mechanism.robot, stand, q)[0, 2]
-    normal = Terrain(gait.uphill, gait.upleft).R[2]  # the vertical in the floor's axes
-    gains = preview_gains(
-        1 / gait.rate, height / normal[2], settings["horizon"], settings["Qe"], settings["Qx"], settings["R"]
-    )
-    # On a slope the CoM stands further uphill: above the foot, not along its normal.
-    cart = follow_reference(gains, reference + height / normal[2] * normal[:2])
+        standing, q = _followed(mechanism, steering, standing, reference[:1])
+        heights, aside = _cart_heights(mechanism, steering, standing, q)
+    cart = _cart(gait, settings, heights, reference)
     if ends:
         start, end = (one.com if gait.com == "true" else one.waist for one in ends)
         cart = led(cart, start, end, more, gait.rate)
-    planned = around(cart)
+    if steering.axis is None:
+        planned = around(cart)
+    else:
+        planned = steering.moved(around(_straight(cart)), (cart.com - cart.com[:1]) * (0, 1 / aside))
     if gait.com == "waist":
         return replace(planned, notes=("the waist is taken for the CoM",))
-    return _tracked(mechanism, planned, cart)
+    return _tracked(mechanism, steering, planned, cart)
+
+
+def _cart(
+    gait: Gait, settings: dict[str, float], heights: tuple[float, float], reference: Array
+) -> CartMotion:
+    """The cart's motion ahead and to the side (T, 2), each at its own height [m]."""
+    normal = Terrain(gait.uphill, gait.upleft).R[2]  # the vertical in the floor's axes
+    weights = [settings[key] for key in ("horizon", "Qe", "Qx", "R")]
+    # On a slope the CoM stands further uphill: above the foot, not along its normal.
+    reference = reference + heights[0] / normal[2] * normal[:2]
+    if heights[0] == heights[1]:
+        gains = preview_gains(1 / gait.rate, heights[0] / normal[2], *weights)
+        return follow_reference(gains, reference)
+    parts = [
+        follow_reference(preview_gains(1 / gait.rate, height / normal[2], *weights), reference[:, k : k + 1])
+        for k, height in enumerate(heights)
+    ]
+    return CartMotion(*(np.hstack([getattr(part, f.name) for part in parts]) for f in fields(CartMotion)))
+
+
+def _straight(cart: CartMotion) -> CartMotion:
+    """The cart's motion without what it does to the side."""
+    first = cart.com[:1] * (0, 1)
+    ahead = [x * (1, 0) for x in (cart.com, cart.velocity, cart.acceleration, cart.zmp)]
+    return CartMotion(ahead[0] + first, ahead[1], ahead[2], ahead[3] + first)
+
+
+def _cart_heights(
+    mechanism: Mechanism, steering: Steering, standing: Plan, q: Array
+) -> tuple[tuple[float, float], float]:
+    """Heights of carts with the robot's moments ahead and to the side; how the CoM moves aside with a lean.
+
+    A cart of mass m at height h has the angular momentum m h v about a point of the floor below it. Of a
+    robot that shifts, h is taken to be the height of its CoM; of one that leans, the sideways one follows
+    from its own momentum.
+    """
+    robot, height = mechanism.robot, _com(mechanism.robot, standing, q)[0, 2]
+    if steering.axis is None:
+        return (height, height), 1.0
+    pushed = steering.driven(standing, np.array([[0.0, 1.0]]), np.zeros((1, 2)))
+    h = _momentum(mechanism, pushed, q)
+    angular = np.cross(standing.T_world_base[0, :3, 3], h[0, 3:]) + h[0, :3]
+    return (height, float(-angular[0] / h[0, 4])), float(h[0, 4] / robot.mass)
 
 
 def zmp_reference(gait: Gait, stance: Stance, holds: tuple[Foothold, ...], steps: int, time: Array) -> Array:
     """Wanted ZMP (T, 2): at rest between the feet, else in the supporting sole [m].
 
     There it goes from ``roll`` on the side that the other foot leaves to ``roll`` on the side where it lands,
-    about the middle and along the foot's x axis.
+    about the middle and along the foot's x axis. Before the first swing of a waist that leans it goes to the
+    foot that swings, and after the last one to the foot that swung, for half a phase: so the first lean is
+    no larger than the next ones. The gait's number ``ahead`` (default 1) times as far ahead of the tips as
+    the middle, which lie below the ankles: these then bear less torque.
 
     Args:
         gait: of kind ``preview`` or ``footsteps``.
@@ -118,19 +166,30 @@ def zmp_reference(gait: Gait, stance: Stance, holds: tuple[Foothold, ...], steps
         steps: number of swings.
         time: (T,) [s].
     """
-    enter = [0.5 * (_middle(stance, holds[0]) + _middle(stance, holds[1]))]
-    leave = enter.copy()
+    middle = partial(_middle, stance, gait.numbers.get("ahead", 1.0))
+    begins, enter = [0.0], [0.5 * (middle(holds[0]) + middle(holds[1]))]
+    leave, leans = enter.copy(), gait.lateral == "lean"
     stand = {hold.foot: hold for hold in holds[:2]}
+
+    def come(phase: float, *places: Array) -> None:
+        begins.append(phase)
+        enter.append(places[0])
+        leave.append(places[-1])
+
+    if leans:
+        come(0.5, middle(stand[stance.foot(swing_side(gait, 0)).name]))
     for n in range(steps):
         supporting = stand[stance.foot(-swing_side(gait, n)).name]
-        for ends, other in ((enter, stand[holds[n + 2].foot]), (leave, holds[n + 2])):
-            ends.append(_middle(stance, supporting, towards=other, by=gait.roll))
+        others = stand[holds[n + 2].foot], holds[n + 2]
+        come(n + 1.0, *(middle(supporting, towards=other, by=gait.roll) for other in others))
         stand[holds[n + 2].foot] = holds[n + 2]
+    if leans:
+        come(steps + 1.0, middle(holds[-1]))
     first, second = stand.values()
-    for ends in (enter, leave):
-        ends.append(0.5 * (_middle(stance, first) + _middle(stance, second)))
-    number = np.clip(np.floor(time / gait.Tc + 1e-9).astype(int), 0, steps + 1)
-    dsp, gone = gait.numbers["dsp"], (time / gait.Tc - number)[:, None]
+    come(steps + (1.5 if leans else 1.0), 0.5 * (middle(first) + middle(second)))
+    phase = time / gait.Tc - (gait.numbers.get("stand", 1.0) - 1)
+    number = np.maximum(np.searchsorted(begins, phase + 1e-9, side="right") - 1, 0)
+    dsp, gone = gait.numbers["dsp"], (phase - np.array(begins)[number])[:, None]
     before, at, after = (
         np.array([leave[0], *leave[:-1]])[number],
         np.array(enter)[number],
@@ -140,10 +199,15 @@ def zmp_reference(gait: Gait, stance: Stance, holds: tuple[Foothold, ...], steps
     return np.asarray(before + np.clip(gone / dsp, 0.0, 1.0) * (at - before) + rolled)
 
 
-def _middle(stance: Stance, hold: Foothold, towards: Foothold | None = None, by: float = 0.0) -> Array:
-    """The middle of a sole on its foothold, or ``by`` along its x axis towards another [m]."""
+def _middle(
+    stance: Stance, ahead: float, hold: Foothold, towards: Foothold | None = None, by: float = 0.0
+) -> Array:
+    """The middle of a sole on its foothold, or ``by`` along its x axis towards another [m].
+
+    It is ``ahead`` times as far ahead of the tip.
+    """
     outlines = {foot.name: foot.sole for foot in stance.feet}
-    x, y = np.mean(outlines[hold.foot], axis=0)
+    x, y = np.mean(outlines[hold.foot], axis=0) * (ahead, 1.0)
     c, s = np.cos(hold.yaw), np.sin(hold.yaw)
     if towards is not None:
         x += float(np.clip(c * (towards.x - hold.x) + s * (towards.y - hold.y), -by, by))
@@ -156,6 +220,7 @@ def _settings(gait: Gait) -> dict[str, float]:
         if name not in gait.numbers:
             faults.append(Fault("[parameters]", name, "missing", "A preview gait needs it"))
     numbers = {name: gait.numbers.get(name, np.nan) for name in SETTINGS}
+    numbers["stand"] = gait.numbers.get("stand", 1.0)
     lifted = gait.channels["foot_height"].at[0]
     if faults:
         raise GaitError(gait.path or f"gait {gait.name}", faults)
@@ -171,6 +236,7 @@ def _settings(gait: Gait) -> dict[str, float]:
             ("Qe", numbers["Qe"] <= 0, "above 0"),
             ("Qx", numbers["Qx"] < 0, "of at least 0"),
             ("R", numbers["R"] <= 0, "above 0"),
+            ("stand", not numbers["stand"] >= 1, "of at least 1"),
         )
         if bad
     ]
@@ -179,9 +245,9 @@ def _settings(gait: Gait) -> dict[str, float]:
     return numbers
 
 
-def _phase(time: Array, Tc: float, steps: int) -> Motion:
-    """Phase of the swings, from 0 at the end of the first standing phase; feet rest where its rate jumps."""
-    value = np.clip(time / Tc - 1, 0.0, float(steps))
+def _phase(time: Array, Tc: float, steps: int, stand: float) -> Motion:
+    """Phase of the swings, from 0 at the end of the first stand; feet rest where its rate jumps."""
+    value = np.clip(time / Tc - stand, 0.0, float(steps))
     moving = (value > 0) & (value < steps)
     return Motion(value, np.where(moving, 1 / Tc, 0.0), np.zeros_like(time))
 
@@ -192,35 +258,35 @@ def _com(robot: Robot, planned: Plan, q: Array) -> Array:
     return np.asarray(as_array(pose_from_array(planned.T_world_base) @ mass_center(robot, D), (len(q),)))
 
 
-def _followed(mechanism: Mechanism, planned: Plan, wanted: Array) -> tuple[Plan, Array]:
+def _followed(mechanism: Mechanism, steering: Steering, planned: Plan, wanted: Array) -> tuple[Plan, Array]:
     """The plan with its waist moved until the CoM stands over ``wanted`` (T, 2), and its joint positions."""
     q = positions(mechanism, planned).state.q
-    share = _share(mechanism, planned, q)
+    share = _share(mechanism, steering, planned, q)
     for _ in range(20):
         error = wanted - _com(mechanism.robot, planned, q)[:, :2]
         if np.abs(error).max() < TRACKED:
             return planned, q
-        planned = _moved(planned, _solved(share, error))
+        planned = steering.moved(planned, _solved(share, error))
         q = positions(mechanism, planned, q).state.q
     far = 1e3 * np.abs(error).max()
     raise NoSolutionError(f"the waist cannot bring the CoM to its reference; {far:.2g} mm are missing")
 
 
-def _tracked(mechanism: Mechanism, planned: Plan, cart: CartMotion) -> Plan:
+def _tracked(mechanism: Mechanism, steering: Steering, planned: Plan, cart: CartMotion) -> Plan:
     """The plan whose CoM of all links follows the cart, in all three derivatives."""
-    planned, q = _followed(mechanism, planned, cart.com)
-    share, none = _share(mechanism, planned, q), np.zeros_like(cart.com)
+    planned, q = _followed(mechanism, steering, planned, cart.com)
+    share, none = _share(mechanism, steering, planned, q), np.zeros_like(cart.com)
     velocity, _ = _com_rates(mechanism, planned, q)
-    planned = _driven(planned, _solved(share, cart.velocity - velocity), none)
+    planned = steering.driven(planned, _solved(share, cart.velocity - velocity), none)
     _, acceleration = _com_rates(mechanism, planned, q)
-    return _driven(planned, none, _solved(share, cart.acceleration - acceleration))
+    return steering.driven(planned, none, _solved(share, cart.acceleration - acceleration))
 
 
-def _share(mechanism: Mechanism, planned: Plan, q: Array) -> Array:
+def _share(mechanism: Mechanism, steering: Steering, planned: Plan, q: Array) -> Array:
     """How the CoM moves with the waist while the feet stay, (T, 2, 2): rates are linear in the waist's."""
     none = np.zeros((len(q), 2))
     rest, _ = _com_rates(mechanism, planned, q)
-    pushed = [_com_rates(mechanism, _driven(planned, none + e, none), q)[0] for e in np.eye(2)]
+    pushed = [_com_rates(mechanism, steering.driven(planned, none + e, none), q)[0] for e in np.eye(2)]
     return np.stack([moved - rest for moved in pushed], axis=-1)
 
 
@@ -228,29 +294,12 @@ def _solved(share: Array, wanted: Array) -> Array:
     return np.asarray(np.linalg.solve(share, wanted[..., None])[..., 0])
 
 
-def _moved(planned: Plan, by: Array) -> Plan:
-    """The plan with its waist, and the hands that hang from it, moved (T, 2) [m]."""
-    T = planned.T_world_base.copy()
-    T[:, :2, 3] += by
-    hands = {name: _added(p, by) for name, p in planned.hand_position.items()}
-    return replace(planned, T_world_base=T, hand_position=hands)
-
-
-def _driven(planned: Plan, velocity: Array, acceleration: Array) -> Plan:
-    """The plan with velocities and accelerations (T, 2) added to waist and hands."""
-    return replace(
-        planned,
-        base_twist=_added(planned.base_twist, velocity, 3),
-        base_acceleration=_added(planned.base_acceleration, acceleration, 3),
-        hand_velocity={name: _added(v, velocity) for name, v in planned.hand_velocity.items()},
-        hand_acceleration={name: _added(a, acceleration) for name, a in planned.hand_acceleration.items()},
-    )
-
-
-def _added(array: Array, by: Array, at: int = 0) -> Array:
-    changed = array.copy()
-    changed[:, at : at + 2] += by
-    return changed
+def _momentum(mechanism: Mechanism, planned: Plan, q: Array) -> Array:
+    """Momentum (T, 6) about the base origin, [angular; linear], with the joints that the plan asks for."""
+    qd = unstack(differentiate(mechanism, planned, State(planned.T_world_base, q)).qd)
+    bodies = Bodies.of(mechanism.robot, pose_from_array(planned.T_world_base).R, unstack(q))
+    h = total_momentum(bodies, qd, twist_from_array(planned.base_twist))
+    return np.hstack([as_array(part, (len(q),)) for part in (h.m, h.f)])
 
 
 def _com_rates(mechanism: Mechanism, planned: Plan, q: Array) -> tuple[Array, Array]:

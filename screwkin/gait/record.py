@@ -33,6 +33,7 @@ CHOICES: Mapping[str, tuple[str, ...]] = {
     "swing": ("minimum-jerk", "cubic"),
     "footholds": ("alternate", "close", "parallel"),
     "com": ("true", "waist"),
+    "lateral": ("shift", "lean"),
     "first": ("right", "left"),
     "arms": ("follow", "rest"),
 }
@@ -80,7 +81,8 @@ class Gait:
     footholds: ``alternate`` (each foot passes the other),
     ``close`` (one leads, the other closes up) or ``parallel`` (as alternate, but from feet side by side to
     feet side by side); first: the foot that swings first. com: what a preview gait steers, the ``true`` CoM
-    of all links or, naively, the ``waist``.
+    of all links or, naively, the ``waist``. lateral: whether the waist of such a gait ``shift``s to the side,
+    or ``lean``s between the hips, as legs without a roll axis at the ankle need it to keep their soles flat.
     swing: spline of a swing. numbers: all of these and the file's own parameters. channels: key points.
     waist: coefficients of a free waist path, or empty. places: where the steps of kind ``footsteps`` end.
     lengths: of the robot that it is fitted to [m]; empty before, when every number that depends on
@@ -107,6 +109,7 @@ class Gait:
     footholds: Footholds
     first: Side
     com: Literal["true", "waist"]
+    lateral: Literal["shift", "lean"]
     arms: Literal["follow", "rest"]
     numbers: Mapping[str, float]
     channels: Mapping[str, Channel]

@@ -1,0 +1,116 @@
+"""A waist that rolls between the hips: rates and accelerations, flat soles, and a walk without ankle roll."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import screwkin as sk
+from screwkin.anatomy.humanoid import humanoid
+from screwkin.errors import GaitError
+from screwkin.gait.footsteps import footholds
+from screwkin.gait.lengths import fitted
+from screwkin.gait.plan import plan
+from screwkin.gait.preview_plan import zmp_reference
+from screwkin.gait.stance import stance_of
+from screwkin.gait.steering import Steering
+from screwkin.model.urdf_in import parse_urdf
+from tests.anatomy.bodies import biped
+
+NO_ANKLE_ROLL = ("hip_yaw", "hip_roll", "hip_pitch", "knee_pitch", "ankle_pitch")
+QUICK = {"period": 2.0, "stand": 2.0, "stride": "0.2*leg", "lift": "0.04*leg"}
+
+
+@pytest.fixture(scope="module")
+def robot() -> sk.Robot:
+    return humanoid(parse_urdf(biped(leg=NO_ANKLE_ROLL).text()).robot)
+
+
+@pytest.fixture(scope="module")
+def gait(robot: sk.Robot) -> sk.Gait:
+    return fitted(sk.load_gait("auto"), robot).replace(lateral="lean", **QUICK)
+
+
+@pytest.mark.parametrize("name", ["walk", "turn"])
+def test_rates_and_accelerations_are_those_of_the_rolled_base(
+    robot: sk.Robot, gait: sk.Gait, name: str
+) -> None:
+    """Against finite differences of the base's pose, also while the level waist turns."""
+    bioloid = sk.load_robot("bioloid")
+    level = plan(fitted(sk.load_gait(name), bioloid).replace(rate=1000.0), stance_of(bioloid), 2)
+    steering, t = Steering.of(robot, gait), level.time
+    waves = np.array([np.sin(3 * t), 3 * np.cos(3 * t), -9 * np.sin(3 * t)])
+    by, velocity, acceleration = waves[..., None] * (0.02, 0.3)
+    rolled = steering.driven(steering.moved(level, by), velocity, np.zeros_like(by))
+    rolled = steering.driven(rolled, np.zeros_like(by), acceleration)
+    T, twist = rolled.T_world_base, rolled.base_twist
+    R, h = T[1:-1, :3, :3], t[1] - t[0]
+    spin = np.einsum("tij,tkj->tik", (T[2:, :3, :3] - T[:-2, :3, :3]) / (2 * h), R)
+    omega = np.stack([spin[:, 2, 1], spin[:, 0, 2], spin[:, 1, 0]], axis=-1)
+    np.testing.assert_allclose(omega, twist[1:-1, :3], atol=1e-4)
+    np.testing.assert_allclose((T[2:, :3, 3] - T[:-2, :3, 3]) / (2 * h), twist[1:-1, 3:], atol=1e-4)
+    slope = (twist[2:] - twist[:-2]) / (2 * h)
+    np.testing.assert_allclose(slope, rolled.base_acceleration[1:-1], atol=2e-3)
+    assert np.ptp(np.arcsin(T[:, 2, 1])) > 0.3
+
+
+def test_points_of_the_roll_s_axis_stay_where_they_are(robot: sk.Robot, gait: sk.Gait) -> None:
+    bioloid = sk.load_robot("bioloid")
+    level = plan(fitted(sk.load_gait("turn"), bioloid), stance_of(bioloid), 2)
+    steering = Steering.of(robot, gait)
+    assert steering.axis is not None
+    R, point = steering.axis
+    rolled = steering.moved(level, np.linspace(0, 0.4, len(level.time))[:, None] * (0.0, 1.0))
+    for at in (point, point + R[:, 0]):
+        before, after = (T[:, :3, :3] @ at + T[:, :3, 3] for T in (level.T_world_base, rolled.T_world_base))
+        np.testing.assert_allclose(after, before, atol=1e-12)
+
+
+def test_soles_stay_flat_and_the_zmp_within_them(robot: sk.Robot, gait: sk.Gait) -> None:
+    walks = {key: sk.walk(robot, gait.replace(lateral=key), steps=2) for key in ("shift", "lean")}
+    sines = {
+        key: max(float(np.abs(walk.T_world_tip[foot][:, 2, 1]).max()) for foot in walk.feet)
+        for key, walk in walks.items()
+    }
+    lean = {key: np.degrees(np.arcsin(sine)) for key, sine in sines.items()}
+    assert lean["shift"] > 5
+    assert lean["lean"] < 1
+    assert walks["shift"].margin.min() < 0
+    assert walks["lean"].margin.min() > 0.02
+    rolled = walks["lean"]
+    assert np.abs(rolled.T_world_base[[0, -1], 2, 1]).max() < 0.02  # it begins and ends upright
+    assert np.abs(rolled.qd[-1]).max() < 0.1
+
+
+def test_before_and_after_the_swings_the_zmp_is_at_the_other_foot(robot: sk.Robot, gait: sk.Gait) -> None:
+    stance, steps = stance_of(robot), 3
+    time = np.arange(round((steps + 4) * gait.Tc * 200)) / 200
+    side = zmp_reference(gait, stance, footholds(gait, stance, steps), steps, time)[:, 1]
+    phase = time / gait.Tc - 2
+    y = stance.foot_y + np.mean(np.array(stance.foot(1).sole)[:, 1])
+    for start, wanted in ((-2, 0), (-0.5, -y), (0, y), (1, -y), (2, y), (3, -y), (3.5, 0)):
+        held = (phase > start + gait.numbers["dsp"] + 1e-6) & (phase < start + 0.5 - 1e-6)
+        np.testing.assert_allclose(side[held], wanted, atol=1e-9)
+
+
+def test_the_zmp_may_stay_below_the_ankles(robot: sk.Robot, gait: sk.Gait) -> None:
+    stance, time = stance_of(robot), np.arange(300) / 50
+    holds = footholds(gait, stance, 3)
+    middle = np.mean([foot.sole for foot in stance.feet], axis=(0, 1))[0]
+    whole, part = (zmp_reference(gait.replace(ahead=share), stance, holds, 3, time) for share in (1.0, 0.3))
+    np.testing.assert_allclose(whole - part, np.tile([0.7 * middle, 0], (300, 1)), atol=1e-12)
+
+
+def test_a_stand_of_less_than_a_phase_is_refused(robot: sk.Robot, gait: sk.Gait) -> None:
+    with pytest.raises(GaitError, match=r"stand: 0\.5 is out of range"):
+        sk.walk(robot, gait.replace(stand=0.5), steps=1)
+
+
+@pytest.mark.slow
+def test_a_robot_without_ankle_roll_gets_a_gait_that_rolls_and_walks_in_both_engines(robot: sk.Robot) -> None:
+    gait = sk.fitting_gait(robot)
+    assert gait.lateral == "lean"
+    walk = sk.walk(robot, gait, 6)
+    for engine in ("mujoco", "pybullet"):
+        check = sk.validate(robot, walk, engine=engine)
+        assert check.passed, check.reasons
