@@ -41,7 +41,7 @@ START = 4.0
 """Time that a quick walk takes to begin and to end, likewise: for so long the next steps move the CoM."""
 BACK = 0.3
 """How far ahead of ankles that are too weak for the middle of the sole the ZMP goes, by that."""
-QUICK = (2.5,)
+QUICK = (2.5, 2.0)
 """Periods of steps that need less sway, where joints of the hips or ankles cannot turn far enough for it."""
 USE = 0.9
 """Share of a joint's speed and torque that a gait may take."""
