@@ -74,15 +74,14 @@ class Gait:
     about the vertical. lift: height of a swing. waist_height: of the waist above the floor. hand_drop: hands
     below their shoulders. sway: factor on the lateral motion of the waist. spread: added to each foot's
     distance from the middle. ramp: steps over which the gait starts and stops (0: at once). steps: how many,
-    by default. rate: samples per second. arms: ``follow`` their hands, or ``rest``
-    at home. uphill, upleft: angles by which the floor rises ahead, along x, and then to the left. roll: how
-    far the wanted ZMP goes from the middle of a sole to where the other foot leaves, then to where it lands.
-    lead: time from home into the walk and out of it, 0 for none.
-    footholds: ``alternate`` (each foot passes the other),
-    ``close`` (one leads, the other closes up) or ``parallel`` (as alternate, but from feet side by side to
-    feet side by side); first: the foot that swings first. com: what a preview gait steers, the ``true`` CoM
-    of all links or, naively, the ``waist``. lateral: whether the waist of such a gait ``shift``s to the side,
-    or ``lean``s between the hips, as legs without a roll axis at the ankle need it to keep their soles flat.
+    by default. rate: samples per second. arms: ``follow`` their hands, or ``rest`` at home. uphill, upleft:
+    angles by which the floor rises ahead, along x, and then to the left. roll: how far the wanted ZMP goes
+    from the middle of a sole to where the other foot leaves, then to where it lands. lead: time from home
+    into the walk and out of it, 0 for none. footholds: ``alternate`` (each foot passes the other), ``close``
+    (one leads, the other closes up) or ``parallel`` (as alternate, but from feet side by side to feet side by
+    side); first: the foot that swings first. com: what a preview gait steers, the ``true`` CoM of all links
+    or, naively, the ``waist``. lateral: whether its waist ``shift``s to the side, or ``lean``s between the
+    hips, as legs without a roll axis at the ankle need it to keep their soles flat.
     swing: spline of a swing. numbers: all of these and the file's own parameters. channels: key points.
     waist: coefficients of a free waist path, or empty. places: where the steps of kind ``footsteps`` end.
     lengths: of the robot that it is fitted to [m]; empty before, when every number that depends on
