@@ -84,8 +84,7 @@ class Gait:
     hips, as legs without a roll axis at the ankle need it to keep their soles flat.
     swing: spline of a swing. numbers: all of these and the file's own parameters. channels: key points.
     waist: coefficients of a free waist path, or empty. places: where the steps of kind ``footsteps`` end.
-    lengths: of the robot that it is fitted to [m]; empty before, when every number that depends on
-    them is NaN.
+    lengths: of the robot that it is fitted to [m]; empty before, when all that depends on them is NaN.
     """
 
     name: str
