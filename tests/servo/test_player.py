@@ -57,6 +57,17 @@ def test_goals_are_where_the_servos_stand_before_torque_comes():
     assert max(map(abs, seen)) <= 1
 
 
+def test_a_motion_that_was_played_to_its_end_holds_its_last_goals_and_not_where_a_load_has_pushed_it():
+    """0.3 N m on a joint of 20 N m/rad: 0.015 rad, three ticks beside the goal."""
+    rig = Rig()
+    for servo in rig.line.servos:
+        servo.body.stiffness, servo.body.load = 20.0, -0.3
+    assert rig.play().well
+    goals = [rig.line.servo(id).get("goal_position") for id in rig.player.bounds.ids]
+    measured = [rig.line.servo(id).get("present_position") for id in rig.player.bounds.ids]
+    assert goals == rig.player.bounds.ticks(steps().q[-1]).tolist() != measured
+
+
 def test_in_a_play_nobody_waits_for_a_lost_reply():
     """It is asked for in the next frame; before and after the play as often as ever."""
     rig, retries = Rig(InjectedFault("dropped", 1.5, share=0.05), seed=3), []
