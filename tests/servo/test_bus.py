@@ -198,18 +198,18 @@ def test_a_sync_read_of_ft_scs_is_the_published_packet_and_who_is_silent_is_aske
 
 
 def joined(*answers: tuple[int, int, bytes]) -> bytes:
-    return joined_status(len(answers), 4, answers)
+    return joined_status(len(answers), len(answers[0][2]), answers)
 
 
 def test_a_fast_sync_read_is_answered_in_one_packet():
-    line = Recorded(joined((1, 0, b"\xa6\0\0\0"), (2, 0x80, b"\x1f\x08\0\0")))
+    line = Recorded(joined((1, 0, b"\xa6\0\0\0\1\2"), (2, 0x80, b"\x1f\x08\0\0\3\4")))
     line.time = 5.0
     bus = bus_on(line, 2.0)
-    found = bus.read_many([1, 2], 132, 4, "fast")
+    found = bus.read_many([1, 2], 132, 6, "fast")
     assert [packet.split(" ")[7] for packet in line.sent] == ["8A"]
-    assert {id: (reply.value, reply.errors) for id, reply in found.items()} == {
-        1: (166, frozenset()),
-        2: (2079, {"hardware"}),
+    assert found == {
+        1: Reply(1, b"\xa6\0\0\0\1\2"),
+        2: Reply(2, b"\x1f\x08\0\0\3\4", frozenset(("hardware",))),
     }
     counts = bus.statistics
     assert (counts.exchanges, counts.failed, len(counts.recent)) == (1, 0, 1)
