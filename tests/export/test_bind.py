@@ -12,7 +12,7 @@ import pytest
 import screwkin as sk
 from screwkin.algebra.se3 import Pose
 from screwkin.errors import InputError, ShapeError, UnknownNameError
-from screwkin.export import quantities
+from screwkin.export import bind, quantities
 from screwkin.kinematics.formula import formula
 from screwkin.kinematics.kinds import Joints
 from screwkin.model.robot import Robot
@@ -135,3 +135,10 @@ def test_a_new_quantity_is_its_definition_and_one_row(monkeypatch) -> None:
     np.testing.assert_array_equal(sk.bind(ROBOT, "base_height")(state), base_height(ROBOT, state))
     (program,) = quantities.programs(ROBOT, "base_height")
     assert program.name == "bioloid_base_height"
+
+
+def test_without_names_all_is_prepared_but_forward_dynamics(monkeypatch) -> None:
+    asked, whole = [], bind.prepare
+    monkeypatch.setattr(bind, "prepare", lambda robot, *names: asked.extend(names))
+    whole(ROBOT)
+    assert set(asked) == {*quantities.QUANTITIES, *quantities.ALGORITHMS} - {"forward_dynamics"}
