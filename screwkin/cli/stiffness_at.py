@@ -30,7 +30,7 @@ def stiffness_at(
 ) -> int:
     """Loaded equilibrium and Cartesian stiffness in a posture, printed."""
     name = posture or first_posture(robot)
-    state, supports, loads = home(robot, name), list(support or standing(robot)), loads_of(load)
+    state, supports, loads = home(robot, name), list(support or posture_standing(robot)), loads_of(load)
     deflection = static_deflection(robot, state, supports, k, loads=loads)
     deflection.raise_on_failure()
     seen = frame or next(x for x in (*deflection.frames, robot.link_names[-1]) if x not in supports)
@@ -43,7 +43,7 @@ def stiffness_at(
     return 0
 
 
-def standing(robot: Robot) -> tuple[str, ...]:
+def posture_standing(robot: Robot) -> tuple[str, ...]:
     """What a robot stands on: its base where that is fixed, else the tips of its legs, else its base."""
     legs = tuple(limb.tip for limb in robot.limbs if limb.kind == "leg")
     return legs if legs and robot.base == "floating" else ("base",)

@@ -88,7 +88,7 @@ class Loaded:
 
 
 @dataclass(frozen=True, eq=False)
-class Balance:
+class ElasticBalance:
     """Forces at deflections of A samples; coordinates y = sqrt(unit) theta.
 
     Attributes:
@@ -146,7 +146,9 @@ def stands(loaded: Loaded, rows: Array) -> list[Pose]:
     return [pose_from_array(as_array(pose, (len(rows),))) for pose in poses]
 
 
-def balance(loaded: Loaded, rows: Array, stand: Sequence[Pose], theta: Array, at: Array) -> Balance:
+def elastic_balance(
+    loaded: Loaded, rows: Array, stand: Sequence[Pose], theta: Array, at: Array
+) -> ElasticBalance:
     """Forces of some samples.
 
     Args:
@@ -178,14 +180,16 @@ def balance(loaded: Loaded, rows: Array, stand: Sequence[Pose], theta: Array, at
     if not loaded.held:
         scaled = H / s[..., :, None] / s[..., None, :]
         one = np.broadcast_to(np.eye(theta.shape[1]), H.shape)
-        return Balance(here, unit, g / s, scaled, one, np.zeros_like(g), np.zeros((count, 0, 6)))
+        return ElasticBalance(here, unit, g / s, scaled, one, np.zeros_like(g), np.zeros((count, 0, 6)))
     c, ends = _gaps(loaded, here, targets, count)
     J = np.concatenate([J for J, _ in ends], axis=1) / s[..., None, :]
     inverse, P = _inverse(J)
     wrenches = _times(inverse.swapaxes(1, 2), g / s).reshape(count, -1, 6)
     for k, (_, bends) in enumerate(ends):
         H -= bends(wrenches[:, k])
-    return Balance(here, unit, g / s, H / s[..., :, None] / s[..., None, :], P, _times(inverse, c), wrenches)
+    return ElasticBalance(
+        here, unit, g / s, H / s[..., :, None] / s[..., None, :], P, _times(inverse, c), wrenches
+    )
 
 
 def frame_columns(here: Supported, frame: str, count: int) -> tuple[Array, Any]:

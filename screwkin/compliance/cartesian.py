@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.compliance.balance import Balance
+from screwkin.compliance.balance import ElasticBalance
 from screwkin.compliance.equilibrium import SETTLED, balances, equilibrium
 from screwkin.compliance.laws import Spring
 from screwkin.compliance.springs import SpringChoice
@@ -128,7 +128,7 @@ def cartesian_stiffness(
     return K.reshape(*batch, 6, 6)
 
 
-def _without(here: Balance, B: Array, spring: Array) -> Array:
+def _without(here: ElasticBalance, B: Array, spring: Array) -> Array:
     """Stiffness (A, 6, 6) at a frame of columns B (A, 6, n): with a spring (A, 6) there, less the spring."""
     S, Bt = spring[:, :, None] * np.eye(6), B.swapaxes(1, 2)
     return np.asarray(np.linalg.inv(B @ np.linalg.solve(here.left + Bt @ S @ B, Bt)) - S)

@@ -18,7 +18,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.newton import newton, solved
 from screwkin.compiler.run import run
-from screwkin.compliance.balance import Balance, Loaded, balance, spring_slopes, stands
+from screwkin.compliance.balance import ElasticBalance, Loaded, elastic_balance, spring_slopes, stands
 from screwkin.compliance.deflection import linear, moved, newton_step
 
 SETTLED = 1e-12
@@ -97,15 +97,15 @@ def equilibrium(loaded: Loaded) -> Deflected:
     return Deflected(theta, *_moved(loaded, theta), residual, iterations, stable)
 
 
-def balances(loaded: Loaded, theta: Array) -> Iterator[tuple[Array, Balance]]:
+def balances(loaded: Loaded, theta: Array) -> Iterator[tuple[Array, ElasticBalance]]:
     """Samples (A,) and their forces at deflections theta (B, n), some at a time."""
     for rows in _blocks(np.ones(len(theta), dtype=bool)):
         yield rows, _balance_of(loaded, rows)(theta[rows], np.arange(len(rows)))
 
 
-def _balance_of(loaded: Loaded, rows: Array) -> Callable[[Array, Array], Balance]:
+def _balance_of(loaded: Loaded, rows: Array) -> Callable[[Array, Array], ElasticBalance]:
     stand = stands(loaded, rows)
-    return lambda theta, at: balance(loaded, rows, stand, theta, at)
+    return lambda theta, at: elastic_balance(loaded, rows, stand, theta, at)
 
 
 def _moved(loaded: Loaded, theta: Array) -> tuple[Array, Array]:
@@ -145,7 +145,7 @@ def _steps(loaded: Loaded) -> tuple[Array, Array, Array, Array]:
     return theta, residual, steps, certified
 
 
-def _definite(here: Balance) -> Array:
+def _definite(here: ElasticBalance) -> Array:
     """(A,) bool: every further deflection that is left is resisted, by the least eigenvalue."""
     left = (here.left + here.left.swapaxes(1, 2)) / 2
     sound = np.asarray(np.isfinite(left).all(axis=(1, 2)))

@@ -33,7 +33,7 @@ SAME = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
+class LeadStance:
     """The robot at home with its feet on two footholds: waist and CoM.
 
     height: of the waist above the soles [m]; waist, com: (2,) over the floor [m].
@@ -44,7 +44,7 @@ class Standing:
     com: Array
 
 
-def at_home(robot: Robot, stance: Stance, holds: tuple[Foothold, ...], gait: Gait) -> Standing:
+def at_home(robot: Robot, stance: Stance, holds: tuple[Foothold, ...], gait: Gait) -> LeadStance:
     """The robot at home on the footholds where its feet stand.
 
     Args:
@@ -68,10 +68,10 @@ def at_home(robot: Robot, stance: Stance, holds: tuple[Foothold, ...], gait: Gai
         raise GaitError(gait.path or f"gait {gait.name}", [_apart(stance, holds)])
     height = first[2, 3] - max(hold.z for hold in stand.values())
     com = first @ [*as_array(back @ mass_center(robot, D)).astype(float), 1.0]
-    return Standing(float(height), first[:2, 3], com[:2])
+    return LeadStance(float(height), first[:2, 3], com[:2])
 
 
-def beside(stance: Stance, holds: tuple[Foothold, ...]) -> StepEnd:
+def side_by_side(stance: Stance, holds: tuple[Foothold, ...]) -> StepEnd:
     """Where the foot that does not step last would stand as at home, beside the other."""
     last = holds[-1]
     side = next(foot.side for foot in stance.feet if foot.name == last.foot)
@@ -82,7 +82,7 @@ def beside(stance: Stance, holds: tuple[Foothold, ...]) -> StepEnd:
 
 
 def _apart(stance: Stance, holds: tuple[Foothold, ...]) -> Fault:
-    place = beside(stance, holds)
+    place = side_by_side(stance, holds)
     where = f"x {place.x:.6g}, y {place.y:.6g}, z {place.z:.6g} m, yaw {place.yaw:.6g} rad"
     found = f"from home and back need feet as at home, but they stand apart after step {holds[-1].step + 1}"
     return Fault("[gait]", "lead", found, f"Let a last step end at {where}, or set lead = 0")

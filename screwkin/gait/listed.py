@@ -11,7 +11,7 @@ from typing import Any, cast
 
 from screwkin.errors import Fault, GaitError, InputError, near
 from screwkin.gait.footsteps import footholds
-from screwkin.gait.lead import LEAD, SAME, beside
+from screwkin.gait.lead import LEAD, SAME, side_by_side
 from screwkin.gait.places import HEIGHT, KEYS, StepEnd, read_places
 from screwkin.gait.record import CHOICES, Gait, Side, gait_from_dict
 from screwkin.gait.stance import Stance
@@ -152,7 +152,7 @@ def closed(gait: Gait, stance: Stance, steps: int) -> tuple[Gait, int]:
         return gait, steps
     holds = footholds(gait, stance, steps)
     last = next(hold for hold in reversed(holds) if hold.foot != holds[-1].foot)
-    place = beside(stance, holds)
+    place = side_by_side(stance, holds)
     apart = (last.x - place.x, last.y - place.y, last.z - place.z, last.yaw - place.yaw)
     document = gait.to_dict()
     document["foothold"] = document["foothold"][:steps]

@@ -57,7 +57,7 @@ def _check_pose(robot: Robot, hold: Hold, tip: str, target: Array) -> None:
         )
 
 
-def judged(robot: Robot, solution: PoseSolution, settings: IkSettings) -> PoseSolution:
+def judged_limbs(robot: Robot, solution: PoseSolution, settings: IkSettings) -> PoseSolution:
     """The solution, unreachable where a closure that holds tips is open.
 
     Args:

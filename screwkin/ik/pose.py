@@ -13,7 +13,7 @@ import numpy as np
 
 from screwkin.algebra.scalar import is_jax
 from screwkin.errors import InputError, ShapeError, UnknownNameError, one_of
-from screwkin.ik.held import judged, with_held_targets
+from screwkin.ik.held import judged_limbs, with_held_targets
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.pose_solution import PoseSolution
 from screwkin.ik.system import checked_free, refuse_free_in_jax
@@ -101,7 +101,7 @@ def solve_pose(
         wanted = with_held_targets(robot, wanted)
     try:
         solution = solve_whole_body(robot, wanted, q, batch, method, settings, open_)
-        return judged(robot, solution, settings) if robot.closures else solution
+        return judged_limbs(robot, solution, settings) if robot.closures else solution
     except ShapeError:  # once more by the caller's names
         for name, target in wanted.items():
             exact_target(labels[name], checked(labels[name], target))

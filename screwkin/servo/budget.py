@@ -18,7 +18,7 @@ HEALTH = ("present_voltage", "present_temperature")
 _FARTHEST = 24  # bytes that are read along to have the torque registers in the same block
 
 
-class Block(NamedTuple):
+class RegisterBlock(NamedTuple):
     """The bytes that are read from a servo in a play: address, length, and where in them each register is."""
 
     start: int
@@ -26,23 +26,23 @@ class Block(NamedTuple):
     places: Mapping[str, int]
 
 
-def block_of(profile: Profile) -> Block:
+def block_of(profile: Profile) -> RegisterBlock:
     """The registers of a play as they stand in a servo's table, with those between them."""
     names = [name for name in (*BLOCK, *HEALTH) if name in profile.registers]
     end = max(profile.register(name).end for name in names)
     names = [name for name in names if end - profile.register(name).address <= _FARTHEST]
     start = min(profile.register(name).address for name in names)
-    return Block(start, end - start, {name: profile.register(name).address - start for name in names})
+    return RegisterBlock(start, end - start, {name: profile.register(name).address - start for name in names})
 
 
-def indirect_block(profile: Profile) -> Block | None:
+def indirect_block(profile: Profile) -> RegisterBlock | None:
     """All registers of a play side by side, by indirect addresses; None where there is no room for them."""
     places, length = {}, 0
     for name in (*BLOCK, *HEALTH):
         places[name] = length
         length += profile.register(name).width
     shadows = profile.indirect
-    return Block(shadows.data, length, places) if shadows and length <= shadows.count else None
+    return RegisterBlock(shadows.data, length, places) if shadows and length <= shadows.count else None
 
 
 @dataclass(frozen=True)
