@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.compliance.balance import ElasticBalance
-from screwkin.compliance.equilibrium import SETTLED, balances, equilibrium
+from screwkin.compliance.balance import ElasticBalance, Loaded
+from screwkin.compliance.equilibrium import SETTLED, Deflected, balances, equilibrium
 from screwkin.compliance.laws import Spring
 from screwkin.compliance.springs import SpringChoice
 from screwkin.compliance.stiffness import loaded_robot
@@ -49,8 +49,7 @@ def cartesian_compliance(
         InputError, ShapeError, UnknownNameError, NoSolutionError: as for ``cartesian_stiffness``.
     """
     loaded, _, batch = loaded_robot(robot, state, support, stiffness, gravity, loads, springs)
-    solved = equilibrium(loaded)
-    _refuse_collapse(solved.residual)
+    solved = _at_rest(loaded)
     C = np.empty((len(loaded.q), 6, 6))
     for rows, here in balances(loaded, solved.theta):
         free = np.flatnonzero(~solved.stable[rows])
@@ -109,8 +108,7 @@ def cartesian_stiffness(
     Source: paper B, eq. 15; Klimchik, Chablat and Pashkevich (2014).
     """
     loaded, _, batch = loaded_robot(robot, state, support, stiffness, gravity, loads, springs)
-    solved = equilibrium(loaded)
-    _refuse_collapse(solved.residual)
+    solved = _at_rest(loaded)
     K = np.empty((len(loaded.q), 6, 6))
     for rows, here in balances(loaded, solved.theta):
         B = here.columns(frame)
@@ -134,9 +132,12 @@ def _without(here: ElasticBalance, B: Array, spring: Array) -> Array:
     return np.asarray(np.linalg.inv(B @ np.linalg.solve(here.left + Bt @ S @ B, Bt)) - S)
 
 
-def _refuse_collapse(residual: Array) -> None:
-    lost = np.flatnonzero(~(residual <= SETTLED))
+def _at_rest(loaded: Loaded) -> Deflected:
+    """The equilibrium, which every sample must have."""
+    solved = equilibrium(loaded)
+    lost = np.flatnonzero(~(solved.residual <= SETTLED))
     if len(lost):
         raise NoSolutionError(
             f"sample {lost[0]}: there is no equilibrium of springs, weight and loads; raise the stiffness"
         )
+    return solved

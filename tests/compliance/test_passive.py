@@ -20,6 +20,7 @@ from screwkin.errors import (
     SingularError,
     UnknownNameError,
 )
+from tests.held import on_both_feet
 
 ARM = """
 [robot]
@@ -188,15 +189,7 @@ def test_a_far_turned_four_bar_rests_where_its_energy_is_least():
 def test_feet_that_a_table_holds_on_the_floor_are_supports():
     """Closures with the floor in place of two names: the same rest, the same wrench of the ground."""
     free = sk.load_robot("bioloid")
-    sole = """
-[[closure]]
-name = "right_sole"
-link_a = "right_foot_link"
-frame_a = { xyz = [0, "-hip_y", "-thigh - calf - ankle_height"] }
-link_b = "floor"
-frame_b = { xyz = [0, "-hip_y", 0] }
-"""
-    held, home = sk.robot_from_text(free.text + sole), sk.home(free)
+    held, home = on_both_feet(), sk.home(free)
     push = {"base": [5.0, 3.0, -10.0]}
     two = static_deflection(free, home, ["right_foot", "left_foot"], 20.0, loads=push)
     by_table = static_deflection(held, home, "right_foot", 20.0, loads=push)
