@@ -43,15 +43,18 @@ class Block:
     @property
     def corners(self) -> Array:
         """Corners (4, 2) of its top seen along the floor's normal, counter-clockwise [m]."""
-        c, s = math.cos(self.yaw), math.sin(self.yaw)
         own = 0.5 * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) * [self.length, self.width]
-        return np.asarray(own @ np.array([[c, s], [-s, c]]) + [self.x, self.y])
+        return np.asarray(own @ self._turn.T + [self.x, self.y])
 
     def holds(self, points: Array) -> NDArray[np.bool_]:
         """Whether points (..., 2) of the floor lie within it, seen along the normal."""
-        c, s = math.cos(self.yaw), math.sin(self.yaw)
-        own = np.abs((points - [self.x, self.y]) @ np.array([[c, -s], [s, c]]))
+        own = np.abs((points - [self.x, self.y]) @ self._turn)
         return np.asarray((own <= [0.5 * self.length, 0.5 * self.width]).all(axis=-1))
+
+    @property
+    def _turn(self) -> Array:
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        return np.array([[c, -s], [s, c]])
 
 
 @dataclass(frozen=True)

@@ -145,22 +145,22 @@ def plan_around(
     return Plan(
         gait=gait,
         steps=steps,
-        time=_read_only(time),
-        phase=_read_only(phase.value),
-        T_world_base=_read_only(base[0]),
-        base_twist=_read_only(base[1]),
-        base_acceleration=_read_only(base[2]),
+        time=read_only(time),
+        phase=read_only(phase.value),
+        T_world_base=read_only(base[0]),
+        base_twist=read_only(base[1]),
+        base_acceleration=read_only(base[2]),
         T_world_tip=_each(feet, lambda foot: level_pose(foot)),
         tip_twist=_each(feet, lambda foot: level_twist(foot.rate)),
         tip_acceleration=_each(feet, lambda foot: level_twist(foot.acceleration)),
         hand_position=_each(hands, lambda hand: hand.value),
         hand_velocity=_each(hands, lambda hand: hand.rate),
         hand_acceleration=_each(hands, lambda hand: hand.acceleration),
-        contact=_read_only(contact),
+        contact=read_only(contact),
         feet=tuple(foot.name for foot in stance.feet),
         footholds=holds,
         terrain=terrain,
-        boundaries=_read_only(boundaries),
+        boundaries=read_only(boundaries),
         sole_gap=gap,
         notes=notes if terrain.flat else (*notes, f"this walk supposes that {terrain}"),
     )
@@ -246,12 +246,12 @@ def _notes(gait: Gait, timing: Timing) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _read_only(array: Any) -> Any:
-    """A read-only copy."""
+def read_only(array: Any) -> Any:
+    """A copy of an array that cannot be written to."""
     array = np.array(array)
     array.flags.writeable = False
     return array
 
 
 def _each(motions: Mapping[str, Motion], part: Any) -> Mapping[str, Array]:
-    return MappingProxyType({name: _read_only(part(motion)) for name, motion in motions.items()})
+    return MappingProxyType({name: read_only(part(motion)) for name, motion in motions.items()})

@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.gait.plan import Plan
+from screwkin.gait.plan import Plan, read_only
 
 
 def tilted(plan: Plan) -> Plan:
@@ -24,11 +24,11 @@ def tilted(plan: Plan) -> Plan:
     def pose(T: Array) -> Array:
         turned = np.array(T)
         turned[:, :3] = R @ T[:, :3]
-        return _read_only(turned)
+        return read_only(turned)
 
     def vector(v: Array) -> Array:
         """Vectors (T, 3), or twists (T, 6), in the world's axes."""
-        return _read_only((v.reshape(len(v), -1, 3) @ R.T).reshape(v.shape))
+        return read_only((v.reshape(len(v), -1, 3) @ R.T).reshape(v.shape))
 
     def each(turn: Callable[[Array], Array], of: Mapping[str, Array]) -> Mapping[str, Array]:
         return MappingProxyType({name: turn(value) for name, value in of.items()})
@@ -45,8 +45,3 @@ def tilted(plan: Plan) -> Plan:
         hand_velocity=each(vector, plan.hand_velocity),
         hand_acceleration=each(vector, plan.hand_acceleration),
     )
-
-
-def _read_only(array: Array) -> Array:
-    array.flags.writeable = False
-    return array
