@@ -196,18 +196,17 @@ class MuJoCoBackend:
     def _pressing(self) -> Iterator[Contact]:
         """Points where the floor presses on the robot; the force includes friction."""
         mj, model, data = self._mj, self.model, self.data
-        wrench = np.zeros(6)
-        for k in range(data.ncon):
-            touch = data.contact[k]
-            mj.mj_contactForce(model, data, k, wrench)
-            if wrench[0] <= 0.0:
-                continue
-            # The frame's rows are the normal, from the first geometry to the second, and two tangents.
-            force = touch.frame.reshape(3, 3).T @ wrench[:3]
-            floor, other = touch.geom
-            body = model.geom_bodyid[other if model.geom_bodyid[floor] == 0 else floor]
-            force = force if model.geom_bodyid[floor] == 0 else -force
-            yield Contact(self._links[int(body)], tuple(touch.pos.tolist()), tuple(force.tolist()))
+        wrench, touch = np.zeros((data.ncon, 6)), data.contact
+        for k, row in enumerate(wrench):
+            mj.mj_contactForce(model, data, k, row)
+        # A frame's rows are the normal, from the first geometry to the second, and two tangents.
+        forces = (touch.frame.reshape(-1, 3, 3).transpose(0, 2, 1) @ wrench[:, :3, None])[:, :, 0]
+        bodies = model.geom_bodyid[touch.geom].reshape(-1, 2)
+        forces = np.where(bodies[:, :1] == 0, forces, -forces)
+        points = touch.pos.reshape(-1, 3)
+        for k in np.flatnonzero(wrench[:, 0] > 0.0):
+            (x, y, z), (u, v, w) = points[k].tolist(), forces[k].tolist()
+            yield Contact(self._links[int(bodies[k].max())], (x, y, z), (u, v, w))
 
     def _ankle_wrench(self, body: int) -> Array:
         """Ground wrench [m; f] about the world origin, from the force in the joint above a foot at rest.

@@ -34,6 +34,7 @@ from screwkin.sim.drive import UNLIMITED, RigidServos, Servos, motored
 from screwkin.sim.floor import floor_in_pybullet
 from screwkin.sim.loops import close_in_pybullet, quat_xyzw
 from screwkin.sim.motors import MotorServos
+from screwkin.sim.pybullet_look import Look
 from screwkin.sim.quiet import quiet
 from screwkin.sim.rotors import RelativeRotors, with_rotors
 
@@ -71,9 +72,10 @@ class Physics:
 
 @dataclass(frozen=True, eq=False)
 class _Foot:
-    """A leg's last link: PyBullet's index of it, its tip, the axis of the joint above, its mass [kg]."""
+    """A leg's last link: PyBullet's index, row in a ``Look``, tip, axis of the joint above, mass [kg]."""
 
     index: int
+    row: int
     T_link_tip: Array
     axis_in_inertial: Array
     turns: bool
@@ -220,6 +222,9 @@ class PyBulletBackend:
                 **self._here,
             )
 
+    def _looked(self) -> Look:
+        return Look(self._p, self._here, self._body, self._tree)
+
     def _foot(self, limb: Limb) -> _Foot:
         robot, p = self._robot, self._p
         index = self._link_names.index(limb.link) - 1
@@ -230,6 +235,7 @@ class PyBulletBackend:
         R_inertial_link = self._pose((0.0, 0.0, 0.0), info[4])[:3, :3].T
         return _Foot(
             index=index,
+            row=self._tree.index(index),
             T_link_tip=as_array(back @ limb.frame),
             axis_in_inertial=R_inertial_link @ as_array(back.R @ joint.screw.s),
             turns=joint.type == "revolute",
@@ -254,7 +260,7 @@ class PyBulletBackend:
         self._applied = np.zeros(len(self._joints))
         if self._rotors is not None:
             self._rotors.reset()
-        self._steps = 0
+        self._look, self._steps = self._looked(), 0
         if self._began is not None:
             self._began = time.monotonic()
         return self.observe()
@@ -263,16 +269,15 @@ class PyBulletBackend:
         """Let one step pass under a command."""
         self._drive(command)
         self._p.stepSimulation(**self._here)
+        self._look = self._looked()
         self._steps += 1
         if self._began is not None and self._steps % 20 == 0:
             self._show(self._began)
 
     def _drive(self, command: Command) -> None:
         """Set the motors for one step, each a constraint on its rate within a bound, and apply torques."""
-        p, here = self._p, self._here
-        states = p.getJointStates(self._body, self._joints, **here)
-        q, qd = np.array([state[:2] for state in states]).T
-        motor = np.array([state[3] for state in states])
+        p, here, look, count = self._p, self._here, self._look, len(self._joints)
+        q, qd, motor = look.q[:count], look.qd[:count], look.motor[:count]
         action = self._servos.actuate(q, qd, motor, command, self.dt).on(self._motored)
         p.setJointMotorControlArray(
             self._body,
@@ -283,13 +288,15 @@ class PyBulletBackend:
             **here,
         )
         self._applied = action.torque
-        if action.torque.any():
-            p.setJointMotorControlArray(
-                self._body, self._joints, p.TORQUE_CONTROL, forces=action.torque.tolist(), **here
-            )
+        torque = np.concatenate([action.torque, np.zeros(len(self._tree) - count)])
         if self._rotors is not None:
-            torque = np.append(action.torque, np.zeros(len(self._robot.coupled)))
-            self._rotors.correct(torque, self.dt)
+            moment, beside = self._rotors.forces(look, torque, self.dt)
+            p.applyExternalTorque(self._body, -1, moment.tolist(), p.WORLD_FRAME, **here)
+            torque = torque + beside
+        if torque.any():
+            p.setJointMotorControlArray(
+                self._body, self._tree, p.TORQUE_CONTROL, forces=torque.tolist(), **here
+            )
 
     def _show(self, began: float) -> None:
         """Keep a window's camera on the robot, and its time no faster than the world's."""
@@ -301,48 +308,41 @@ class PyBulletBackend:
 
     def observe(self) -> Observation:
         """The state after the last step."""
-        p, here = self._p, self._here
-        joints = p.getJointStates(self._body, self._joints, **here)
-        position, quat_xyzw = p.getBasePositionAndOrientation(self._body, **here)
-        links = [p.getLinkState(self._body, foot.index, **here) for foot in self._feet]
+        look, count = self._look, len(self._joints)
         return Observation(
             time=self._steps * self.dt,
-            T_world_base=self._pose(position, quat_xyzw) @ self._T_inertial_base,
-            q=np.array([joint[0] for joint in joints]),
-            qd=np.array([joint[1] for joint in joints]),
-            torque=self._applied + [joint[3] for joint in joints],
-            T_world_foot=np.array(
-                [
-                    self._pose(link[4], link[5]) @ foot.T_link_tip
-                    for foot, link in zip(self._feet, links, strict=True)
-                ]
-            ).reshape(-1, 4, 4),
-            ankle_wrench=np.array(
-                [self._ankle_wrench(foot, link) for foot, link in zip(self._feet, links, strict=True)]
-            ).reshape(-1, 6),
+            T_world_base=self._pose(*look.base) @ self._T_inertial_base,
+            q=look.q[:count],
+            qd=look.qd[:count],
+            torque=self._applied + look.motor[:count],
+            T_world_foot=np.array([self._foot_pose(foot) for foot in self._feet]).reshape(-1, 4, 4),
+            ankle_wrench=np.array([self._ankle_wrench(foot) for foot in self._feet]).reshape(-1, 6),
             contacts=tuple(self._contacts()),
         )
 
+    def _foot_pose(self, foot: _Foot) -> Array:
+        """World pose (4, 4) of a foot's tip."""
+        link = self._look.links[foot.row]
+        return self._pose(link[4], link[5]) @ foot.T_link_tip
+
     def _contacts(self) -> Iterator[Contact]:
         """Points where the floor presses on the robot; the force includes friction."""
-        for touch in sum((self._p.getContactPoints(self._body, b, **self._here) for b in self._floor), ()):
-            normal, pressing = touch[7], touch[9]
-            if pressing <= 0.0:
+        for touch in self._look.touches:
+            pressing = touch[9]
+            if pressing <= 0.0 or touch[2] not in self._floor:
                 continue
-            side, along_side, other, along_other = touch[10:14]
-            force = [
-                n * pressing + a * side + b * other
-                for n, a, b in zip(normal, along_side, along_other, strict=True)
-            ]
-            yield Contact(self._link_names[touch[3] + 1], touch[6], (force[0], force[1], force[2]))
+            (x, y, z), (u, v, w), (r, s, t) = touch[7], touch[11], touch[13]
+            a, b = touch[10], touch[12]
+            force = x * pressing + a * u + b * r, y * pressing + a * v + b * s, z * pressing + a * w + b * t
+            yield Contact(self._link_names[touch[3] + 1], touch[6], force)
 
-    def _ankle_wrench(self, foot: _Foot, link: Any) -> Array:
+    def _ankle_wrench(self, foot: _Foot) -> Array:
         """Ground wrench [m; f] about the world origin, from the sensor in the joint above a foot at rest.
 
         PyBullet reports the reaction on the child in the child's inertial frame, about its CoM, without the
         share of the motor. The floor supplies what is needed beside that and the foot's weight.
         """
-        _, _, reaction, motor = self._p.getJointState(self._body, foot.index, **self._here)
+        (_, _, reaction, motor), link = self._look.joints[foot.row], self._look.links[foot.row]
         force, moment = np.array(reaction[:3]), np.array(reaction[3:])
         if foot.turns:
             moment = moment + motor * foot.axis_in_inertial

@@ -27,6 +27,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.errors import InputError
 from screwkin.model.robot import Robot
+from screwkin.sim.pybullet_look import Look, rotations
 
 SHARE = 0.5
 """Part of the improvement that is made in one step, as friction in the joints is not known to it."""
@@ -62,7 +63,12 @@ def with_rotors(robot: Robot, rotors: Array, steadied: bool) -> Robot:
 
 
 class RelativeRotors:
-    """Forces that make balls on links act as rotors at joints, for one body in PyBullet."""
+    """Forces that make balls on links act as rotors at joints, for one body in PyBullet.
+
+    Its m rates are the base's angular velocity and that of its CoM, if it floats, then those of n joints.
+    Columns of S (6, m) are their twists at the base's CoM, of which a link has those that move it; A (3, m)
+    are their angular velocities.
+    """
 
     def __init__(
         self, p: Any, client: dict[str, int], body: int, joints: list[int], rotors: Array, floating: bool
@@ -78,108 +84,111 @@ class RelativeRotors:
                 the base carries the largest.
             floating: whether the base moves.
         """
-        self._first = 6 if floating else 0
-        self._p, self._client, self._body, self._joints, self._rotors = p, client, body, joints, rotors
+        count = len(joints)
+        self._base = 6 if floating else 0
         infos = [p.getJointInfo(body, j, **client) for j in joints]
         dynamics = [p.getDynamicsInfo(body, link, **client) for link in (-1, *joints)]
-        self._mass = sum(d[0] for d in dynamics)
-        self._root_mass = np.sqrt([d[0] for d in dynamics])
-        self._root_balls = np.sqrt([rotors.max(), *rotors])
-        self._root_inertia = np.sqrt([d[2] for d in dynamics])
-        self._axes = np.array([info[13] for info in infos])
-        self._above = np.zeros((len(joints) + 1, len(joints)), dtype=bool)
+        self._fixed = FIXED * sum(d[0] for d in dynamics)
+        self._root_mass = np.sqrt([d[0] for d in dynamics])[:, None, None]
+        self._root_inertia = np.sqrt([d[2] for d in dynamics])[:, :, None]
+        turned = rotations(np.array([d[4] for d in dynamics[1:]])).transpose(0, 2, 1)
+        self._axes = turned @ np.array([info[13] for info in infos])[:, :, None]
+        self._joint_in_inertial = -turned @ np.array([d[3] for d in dynamics[1:]])[:, :, None]
+        self._row = {joint: k for k, joint in enumerate((-1, *joints))}
+        moved = np.zeros((count + 1, self._base + count))
+        moved[:, : self._base] = 1.0
         for k, info in enumerate(infos):
-            parent = joints.index(info[16]) + 1 if info[16] in joints else 0
-            self._above[k + 1] = self._above[parent]
-            self._above[k + 1, k] = True
+            moved[k + 1] = moved[self._row[info[16]]]
+            moved[k + 1, self._base + k] = 1.0
+        self._moved = moved[:, None]
+        self._rotors = np.diag(self._of_joints(rotors))
+        self._balls = moved.T @ (np.array([[rotors.max()], *rotors[:, None]]) * moved)
+        self._factors = np.zeros((count + 1, 6, 6))
+        self._factors[:, 3:, 3:] = self._root_mass * np.eye(3)
         self.reset()
 
     def reset(self) -> None:
         """Forget the step before."""
         self._velocity: Array | None = None
-        self._rows: Array = np.zeros((0, 0))
-        self._force = np.zeros(self._first + len(self._joints))
-        self._torque = np.zeros(len(self._joints))
+        self._force = np.zeros(len(self._rotors))
+        self._torque = np.zeros(len(self._rotors) - self._base)
+        self._angular = np.zeros((3, len(self._rotors)))
 
-    def correct(self, torque: Array, dt: float) -> None:
-        """Apply the forces for a step of dt [s] in which motors apply torques (n,) [N m]."""
-        p = self._p
-        links = p.getLinkStates(self._body, self._joints, 0, 0, **self._client)
-        velocity = self._rates()
-        mass, rows, touching = self._inertias(links)
-        if self._velocity is not None:
-            fixed = FIXED * self._mass
-            inertia = mass + fixed * touching.T @ touching
-            surplus = rows.T @ rows - np.diag(self._at_joints(self._rotors))
-            changing = rows.T @ ((rows - self._rows) @ velocity) / dt
-            sinking = np.minimum(touching[2::3] @ self._velocity, 0.0)  # points that struck the floor
-            struck = fixed * touching[2::3].T @ sinking / dt
-            beside = np.linalg.solve(inertia, self._at_joints(torque - self._torque) + struck)
-            needed = surplus @ ((velocity - self._velocity) / dt + beside) + changing
-            settled = np.linalg.solve(inertia - surplus, needed - self._force)
-            self._force = self._force + SHARE * inertia @ settled
-            p.setJointMotorControlArray(
-                self._body,
-                self._joints,
-                p.TORQUE_CONTROL,
-                forces=self._force[self._first :].tolist(),
-                **self._client,
-            )
-            if self._first:
-                moment = self._force[:3].tolist()
-                p.applyExternalTorque(self._body, -1, moment, p.WORLD_FRAME, **self._client)
-        self._velocity, self._torque, self._rows = velocity, np.array(torque), rows
+    def forces(self, look: Look, torque: Array, dt: float) -> tuple[Array, Array]:
+        """Moment (3,) on the base and torques (n,) of the joints through a step [N m].
 
-    def _rates(self) -> Array:
-        """Angular and linear velocity of the base's CoM, then joint rates: (6 + n,)."""
-        linear, angular = self._p.getBaseVelocity(self._body, **self._client)
-        joints = self._p.getJointStates(self._body, self._joints, **self._client)
-        return np.array([*angular, *linear, *(joint[1] for joint in joints)])[6 - self._first :]
-
-    def _at_joints(self, values: Array) -> Array:
-        """Values (n,) of joints among those of all rates."""
-        return np.append(np.zeros(self._first), values)
-
-    def _inertias(self, links: Any) -> tuple[Array, Array, Array]:
-        """Mass matrix with the balls, rows whose square is the balls', Jacobian of points on the floor.
-
-        Without the base's rates if it is fixed.
+        Args:
+            look: at the body before the step.
+            torque: (n,) of the motors in the step [N m].
+            dt: duration of the step [s].
         """
-        n = len(links)
-        base, turn = self._p.getBasePositionAndOrientation(self._body, **self._client)
-        com = np.array([base, *(link[0] for link in links)])
-        principal = self._rotations([turn, *(link[1] for link in links)])
-        axes = np.einsum("kij,kj->ki", self._rotations([link[5] for link in links]), self._axes)
-        angular, linear = np.zeros((2, n + 1, 3, 6 + n))
-        angular[:, :, :3] = linear[:, :, 3:6] = np.eye(3)
-        x, y, z = (com[0] - com).T
-        linear[:, 0, 1], linear[:, 0, 2], linear[:, 1, 0] = -z, y, z
-        linear[:, 1, 2], linear[:, 2, 0], linear[:, 2, 1] = -x, -y, x
-        arms = com[:, None] - np.array([link[4] for link in links])
-        angular[:, :, 6:] = np.where(self._above[:, None], axes.T, 0.0)
-        linear[:, :, 6:] = np.where(self._above[:, None], _cross(axes, arms).transpose(0, 2, 1), 0.0)
-        turned = self._root_inertia[:, :, None] * np.einsum("kji,kjm->kim", principal, angular)
-        carried = self._root_mass[:, None, None] * linear
-        free = slice(6 - self._first, None)
-        rows = np.concatenate([carried, turned]).reshape(-1, 6 + n)[:, free]
-        balls = (self._root_balls[:, None, None] * angular).reshape(-1, 6 + n)[:, free]
-        return rows.T @ rows, balls, self._touching(com, angular, linear)[:, free]
+        linear, angular = look.velocity
+        velocity = np.array([*([*angular, *linear] if self._base else ()), *look.qd.tolist()])
+        com, turned = look.com - look.com[0], rotations(look.turned)
+        S = self._twists(com[1:], turned[1:])
+        A = S[:3]
+        if self._velocity is not None:
+            touching = self._touching(look, S)
+            inertia = self._inertia(com, turned, S) + self._fixed * touching.T @ touching
+            surplus = self._balls * (A.T @ A) - self._rotors
+            changing = (self._balls * (A.T @ (A - self._angular))) @ velocity / dt
+            down = touching[2::3]
+            sinking = np.minimum(down @ self._velocity, 0.0)  # points that struck the floor
+            struck = (self._fixed / dt) * (sinking @ down)
+            beside = _solved(inertia, self._of_joints(torque - self._torque) + struck)
+            needed = surplus @ ((velocity - self._velocity) / dt + beside) + changing
+            settled = _solved(inertia - surplus, needed - self._force)
+            self._force = self._force + SHARE * (inertia @ settled)
+        self._velocity, self._torque, self._angular = velocity, torque, A
+        return self._force[:3] if self._base else np.zeros(3), self._force[self._base :]
 
-    def _touching(self, com: Array, angular: Array, linear: Array) -> Array:
-        """Jacobian (3 K, 6 + n) of the points that the floor pressed in the step before."""
-        touches = [t for t in self._p.getContactPoints(self._body, **self._client) if t[9] > 0.0]
-        link = [(-1, *self._joints).index(touch[3]) for touch in touches]
-        arms = np.array([touch[5] for touch in touches]).reshape(-1, 3) - com[link]
-        turned = np.cross(angular[link], arms[:, :, None], axis=1)
-        return np.asarray((linear[link] + turned).reshape(-1, angular.shape[2]))
+    def _of_joints(self, values: Array) -> Array:
+        """Values (n,) of joints among those of all rates (m,)."""
+        return np.concatenate([np.zeros(self._base), values])
 
-    def _rotations(self, quats_xyzw: Any) -> Array:
-        """Rotation matrices (..., 3, 3)."""
-        matrices = [self._p.getMatrixFromQuaternion(quat) for quat in quats_xyzw]
-        return np.array(matrices).reshape(-1, 3, 3)
+    def _twists(self, com: Array, turned: Array) -> Array:
+        """Twists S (6, m) at the base's CoM, of links at (n, 3) from it with principal axes (n, 3, 3)."""
+        axes = turned @ self._axes
+        joints = com + (turned @ self._joint_in_inertial)[:, :, 0]
+        S = np.zeros((6, len(self._rotors)))
+        S[:, : self._base] = np.eye(6, self._base)
+        S[:3, self._base :] = axes[:, :, 0].T
+        S[3:, self._base :] = (_crossed_with(-joints) @ axes)[:, :, 0].T
+        return S
+
+    def _inertia(self, com: Array, turned: Array, S: Array) -> Array:
+        """Mass matrix (m, m) with the balls."""
+        factors = self._factors.copy()
+        factors[:, :3, :3] = self._root_inertia * turned.transpose(0, 2, 1)
+        factors[:, 3:, :3] = self._root_mass * _crossed_with(com)
+        rows = (factors.reshape(-1, 6) @ S).reshape(len(com), 6, -1) * self._moved
+        flat = rows.reshape(-1, S.shape[1])
+        return np.asarray(flat.T @ flat)
+
+    def _touching(self, look: Look, S: Array) -> Array:
+        """Jacobian (3 K, m) of the points that the floor pressed in the step before."""
+        touches = [touch for touch in look.touches if touch[9] > 0.0]
+        if not touches:
+            return np.zeros((0, S.shape[1]))
+        arms = np.array([touch[5] for touch in touches]) - look.com[0]
+        turning = (_crossed_with(arms).reshape(-1, 3) @ S[:3]).reshape(len(touches), 3, -1)
+        rows = (turning + S[3:]) * self._moved[[self._row[touch[3]] for touch in touches]]
+        return np.asarray(rows.reshape(-1, S.shape[1]))
 
 
-def _cross(a: Array, b: Array) -> Array:
-    """Vector products (L, n, 3) of (n, 3) and (L, n, 3); ``np.cross`` is several times slower."""
-    (u, v, w), (x, y, z) = a.T, b.transpose(2, 0, 1)
-    return np.stack([v * z - w * y, w * x - u * z, u * y - v * x], axis=-1)
+_CROSS = np.zeros((3, 3, 3))
+_CROSS[0, 1, 2] = _CROSS[1, 2, 0] = _CROSS[2, 0, 1] = 1.0
+_CROSS[0, 2, 1] = _CROSS[1, 0, 2] = _CROSS[2, 1, 0] = -1.0
+_CROSS = _CROSS.reshape(3, 9)
+
+
+def _crossed_with(points: Array) -> Array:
+    """Matrices (K, 3, 3) that turn a vector into its vector product with points (K, 3)."""
+    return np.asarray((points @ _CROSS).reshape(-1, 3, 3))
+
+
+def _solved(matrix: Array, right: Array) -> Array:
+    """Solution of a small system with a positive definite matrix; ``np.linalg.solve`` takes four times as long."""
+    from scipy.linalg.lapack import dposv
+
+    return np.asarray(dposv(matrix, right)[1])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -102,6 +103,8 @@ def simulate(
     planned = trajectory.base_sampled(times)
     qd = np.diff(q, axis=0) / dt
     backend.reset(State(planned[0], q[0] if start is None else start))
+    low = rule.fallen_height * terrain.above_plane(planned[:, :3, 3])
+    upright = math.cos(rule.fallen_tilt)
     seen: list[Observation] = []
     fallen_at: float | None = None
     for k in range(count):
@@ -110,8 +113,10 @@ def simulate(
         now = float(times[k + 1])
         if progress is not None and k % 100 == 99:
             progress((k + 1) / count)
-        if fallen_at is None and _has_fallen(seen[-1].T_world_base, planned[k + 1], rule, terrain):
-            fallen_at = now
+        if fallen_at is None:
+            T = seen[-1].T_world_base
+            if T[2, 2] < upright or terrain.above_plane(T[:3, 3]) < low[k + 1]:
+                fallen_at = now
         if fallen_at is not None and now > fallen_at + rule.aftermath - dt / 2:
             break
     rows = len(seen)
@@ -159,8 +164,3 @@ def _columns(robot: Robot, seen: list[Observation]) -> dict[str, Any]:
 def _tilt(T: Array) -> Array:
     """Angle between z axes and the vertical [rad]; exact near 0, where the arc cosine is not."""
     return np.asarray(np.arctan2(np.hypot(T[..., 0, 2], T[..., 1, 2]), T[..., 2, 2]))
-
-
-def _has_fallen(T: Array, planned: Array, rule: Schedule, terrain: Terrain) -> bool:
-    height, wanted = terrain.above_plane(np.stack([T[:3, 3], planned[:3, 3]]))
-    return bool(_tilt(T) > rule.fallen_tilt or height < rule.fallen_height * wanted)
