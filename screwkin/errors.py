@@ -88,6 +88,10 @@ class GaitError(FileFaults):
     """A gait file, or a value set over it, is wrong."""
 
 
+class PerturbationError(FileFaults):
+    """A perturbation's file, or a value set over it, is wrong."""
+
+
 class TrajectoryError(InputError):
     """A trajectory file is damaged, truncated, foreign or inconsistent."""
 

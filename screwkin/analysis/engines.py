@@ -16,10 +16,12 @@ from screwkin.motors.library import motors_named, motors_of
 from screwkin.motors.records import Motor
 from screwkin.sim.backend import Backend
 from screwkin.sim.compliant import STEP, Compliance, SpringServos
-from screwkin.sim.drive import Servos
+from screwkin.sim.drive import RigidServos, Servos
 from screwkin.sim.kinematic import KinematicBackend
 from screwkin.sim.motors import MotorServos
 from screwkin.sim.mujoco import MuJoCoBackend, MuJoCoPhysics
+from screwkin.sim.perturbation import NONE, Perturbation
+from screwkin.sim.perturbed import perturbed_ground, perturbed_robot, perturbed_servos
 from screwkin.sim.pybullet import Physics, PyBulletBackend
 from screwkin.trajectory import Trajectory
 
@@ -143,6 +145,7 @@ def opened(
     gui: bool = False,
     finer: Refinement | None = None,
     terrain: Terrain = FLAT,
+    perturbation: Perturbation = NONE,
 ) -> Backend:
     """The simulator of that name, with the robot in it.
 
@@ -153,6 +156,7 @@ def opened(
         gui: show a window.
         finer: than its usual settings.
         terrain: to stand on.
+        perturbation: what differs from the plan, but for its push, which ``simulate`` gives.
 
     Raises:
         InputError: it has no contact forces, or no elastic soles.
@@ -164,29 +168,40 @@ def opened(
             raise InputError(
                 "engine kinematic has no contact forces and cannot simulate compliance; use pybullet"
             )
+        if not perturbation.nothing:
+            raise InputError("engine kinematic has no forces to perturb; use mujoco or pybullet")
         return KinematicBackend(robot)
     dt = STEP if springs is not None else None
     physics: Physics | MuJoCoPhysics
     if engine == "pybullet":
-        physics = _refined(Physics(sole_stiffness=soles), dt, finer)
+        physics = _refined(Physics(sole_stiffness=soles), dt, finer, perturbation)
     elif soles is not None:
         raise InputError("engine mujoco has no elastic soles; use pybullet")
     else:
-        physics = _refined(MuJoCoPhysics(), dt, finer)
+        physics = _refined(MuJoCoPhysics(), dt, finer, perturbation)
     servos: Servos | None = None if springs is None else SpringServos(robot, springs, STEP)
     if motors:
         servos = MotorServos(motors, physics.dt, str(compliance.motors))
+    by = perturbation
+    if not by.nothing:
+        servos = perturbed_servos(servos or RigidServos(robot), robot, by, physics.dt)
+        robot, terrain = perturbed_robot(robot, by), perturbed_ground(terrain, by)
     if isinstance(physics, Physics):
-        return PyBulletBackend(robot, physics, gui, servos, terrain)
-    return MuJoCoBackend(robot, physics, gui, servos, terrain)
+        return PyBulletBackend(robot, physics, gui, servos, terrain, by)
+    return MuJoCoBackend(robot, physics, gui, servos, terrain, by)
 
 
 P = TypeVar("P", Physics, MuJoCoPhysics)
 
 
-def _refined(physics: P, dt: float | None, finer: Refinement | None) -> P:
+def _refined(physics: P, dt: float | None, finer: Refinement | None, perturbation: Perturbation) -> P:
     by, step = finer or Refinement(), dt or physics.dt
-    changes: dict[str, Any] = {"dt": step / by.step, "iterations": physics.iterations * by.iterations}
+    friction = {} if perturbation.friction is None else {"friction": perturbation.friction}
+    changes: dict[str, Any] = {
+        "dt": step / by.step,
+        "iterations": physics.iterations * by.iterations,
+        **friction,
+    }
     if isinstance(physics, Physics):
         changes["regularisation"] = physics.regularisation / by.iterations
     return replace(physics, **changes)

@@ -24,6 +24,7 @@ from screwkin.kinematics.limits import limited_joints
 from screwkin.model.robot import Robot, robot_text
 from screwkin.sim.camera import Camera, Picture
 from screwkin.sim.measure import Slip, ZmpRecord, slip, speed_use, torque_use, zmp_record
+from screwkin.sim.perturbation import NONE, Perturbation
 from screwkin.sim.render import pictures
 from screwkin.sim.run import Run, simulate
 from screwkin.sim.self_collision import collisions_of_run
@@ -67,6 +68,7 @@ def validate(
     progress: Callable[[float], None] | None = None,
     motion: Trajectory | None = None,
     check_solver: bool = False,
+    perturbation: Perturbation = NONE,
 ) -> Validation:
     """Play the trajectory in a simulator and judge what happened.
 
@@ -86,6 +88,7 @@ def validate(
         motion: what the joints do instead, as of servos that were measured; judged against the trajectory.
         check_solver: simulate at half the step and at twice the iterations too; a verdict that this changes,
             or that lies within what it changes, is undecided and has not passed.
+        perturbation: what differs from the plan in the simulation; the plan stays what it is judged by.
 
     Returns:
         Validation: ``passed``, ``reasons`` and what was measured.
@@ -114,7 +117,7 @@ def validate(
 
     def played(name: Engine, finer: Refinement) -> Validation:
         nonlocal done
-        backend = opened(robot, name, compliance, gui and not done, finer, terrain)
+        backend = opened(robot, name, compliance, gui and not done, finer, terrain, perturbation)
         try:
             run = simulate(
                 robot,
@@ -123,6 +126,7 @@ def validate(
                 rule.schedule,
                 lambda share: report(first * (done + share)),
                 start,
+                perturbation,
             )
         finally:
             backend.close()
@@ -289,6 +293,8 @@ def _warnings(robot: Robot, trajectory: Trajectory, run: Run, slipped: Slip, spe
     ]
     if fast:
         warnings.append(f"planned joint speed above the servo's: {', '.join(fast)}")
+    if "perturbation" in run.settings:
+        warnings.append("simulated in a world other than the planned one; send refuses this verdict")
     if run.touched:
         warnings.append(f"links other than feet touched the floor: {', '.join(run.touched)}")
     if slipped.turned > np.deg2rad(5.0):

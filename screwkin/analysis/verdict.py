@@ -182,6 +182,8 @@ def contradictions(verdict: Verdict) -> tuple[str, ...]:
     tilted = verdict.max_tilt_deg > np.rad2deg(Criteria().schedule.fallen_tilt)
     fallen = [f"tilted by {verdict.max_tilt_deg:.0f} deg, and not fallen"] if tilted else []
     others = ["undecided"] if verdict.undecided else []
+    if any("perturbation" in settings for settings in verdict.engine_settings.values()):
+        others.append("simulated in a world that is not the planned one (--perturb)")
     for name in verdict.engine.split("+"):
         alone = verdict.engines.get(name, {})
         if alone.get("passed") is not True or alone.get("fell") is not False:

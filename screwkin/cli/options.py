@@ -10,6 +10,8 @@ from typing import Annotated
 import typer
 
 from screwkin.errors import InputError
+from screwkin.sim.perturbation import Perturbation
+from screwkin.sim.perturbation_files import described, load_perturbation, perturbation_from_texts
 
 RobotName = Annotated[
     str,
@@ -23,6 +25,31 @@ OutputFolder = Annotated[
     Path | None,
     typer.Option("-o", "--output", metavar="DIR", help="Folder for the files; default runs/<time>-…"),
 ]
+
+Perturbed = Annotated[
+    list[str] | None,
+    typer.Option(
+        metavar="KEY=VALUE",
+        help="A world other than the planned one: push=0.2,0,0, slope=3*deg,0, lag.right_knee=0.02, or a "
+        ".toml file with [perturbation]; repeatable.",
+    ),
+]
+
+
+def perturbation_of(texts: Sequence[str]) -> Perturbation:
+    """The perturbation of ``--perturb``: ``key=value`` texts, over those of a file.
+
+    Raises:
+        InputError: a text is neither an assignment nor a file, or a value is wrong.
+    """
+    files = [text for text in texts if "=" not in text]
+    if len(files) > 1:
+        raise InputError(f"--perturb {' and '.join(files)}: give one file, and key=value beside it")
+    of_file = described(load_perturbation(files[0])) if files else ()
+    own = [text for text in texts if "=" in text]
+    keys = {text.partition("=")[0].partition(".")[0].strip() for text in own}
+    base = [text for text in of_file if text.partition("=")[0].partition(".")[0] not in keys]
+    return perturbation_from_texts([*base, *own])
 
 
 def settings(assignments: list[str]) -> dict[str, str]:

@@ -20,6 +20,7 @@ from screwkin.files import atomic_write
 from screwkin.report.page import write_page
 from screwkin.report.pictures import Saved, save_pictures
 from screwkin.sim.camera import Camera, save_gif
+from screwkin.sim.perturbation import NONE, Perturbation
 from screwkin.trajectory import Trajectory
 
 PICTURES_PER_SECOND = 6.0
@@ -30,9 +31,9 @@ FEWEST, MOST = 30, 120
 class Wish:
     """What a simulation is to be: engine, a window, a film, pictures and page; commands for the page.
 
-    check_solver, compliance: see ``validate``. motion: what the joints do instead of the trajectory;
-    criteria: what a walk must satisfy; more: what follows once the verdict is written; it returns what draws
-    more pictures.
+    check_solver, compliance, perturbation: see ``validate``. motion: what the joints do instead of the
+    trajectory; criteria: what a walk must satisfy; more: what follows once the verdict is written; it returns
+    what draws more pictures.
     """
 
     engine: str = "auto"
@@ -42,6 +43,7 @@ class Wish:
     plots: bool = True
     commands: Sequence[str] = ()
     compliance: SimulatedCompliance = field(default_factory=SimulatedCompliance)
+    perturbation: Perturbation = NONE
     motion: Trajectory | None = None
     criteria: Criteria | None = None
     more: Callable[[Validation], Callable[[], Sequence[Saved]]] = lambda check: tuple
@@ -74,6 +76,7 @@ def simulate_to_files(account: Account, folder: Path, verdict: Path, wish: Wish)
             progress=done,
             motion=wish.motion,
             check_solver=wish.check_solver,
+            perturbation=wish.perturbation,
         )
     with atomic_write(verdict) as file:
         data = verdict_of(account.robot, trajectory, check).to_dict()

@@ -13,7 +13,7 @@ from screwkin.analysis.account import account_of, recorded_robot
 from screwkin.analysis.engines import RIGID, SimulatedCompliance
 from screwkin.analysis.verdict import verdict_of
 from screwkin.cli.folder import output_folder
-from screwkin.cli.options import AsJson, OutputFolder, TrajectoryPath
+from screwkin.cli.options import AsJson, OutputFolder, Perturbed, TrajectoryPath, perturbation_of
 from screwkin.cli.output import aligned, print_json
 from screwkin.cli.replay import replay
 from screwkin.cli.simulation import Wish, print_verdict, simulate_to_files
@@ -22,6 +22,7 @@ from screwkin.errors import InputError, OutputError
 from screwkin.files import make_folder
 from screwkin.report.numbers import validation_numbers
 from screwkin.sim.compliant import Compliance
+from screwkin.sim.perturbation_files import described
 from screwkin.trajectory import load_trajectory
 
 
@@ -64,6 +65,7 @@ def validate(
         bool,
         typer.Option("--check-solver", help="Also at half the step and twice the iterations."),
     ] = False,
+    perturb: Perturbed = None,
     plots: Annotated[bool, typer.Option(help="Draw the pictures and write the report.")] = True,
     log: Annotated[
         Path | None,
@@ -80,11 +82,13 @@ def validate(
     engine_named(engine)
     compliance = _compliance(compliant, k, sole_stiffness, repeat, servo)
     if log is not None:
-        if compliance != SimulatedCompliance():
+        if compliance != SimulatedCompliance() or perturb:
             raise InputError(
-                "--log replays servos that moved; it goes without --servo, --compliant and --sole-stiffness"
+                "--log replays servos that moved; it goes without --servo, --compliant, --sole-stiffness and "
+                "--perturb"
             )
         return replay(trajectory, log, Wish(engine, check_solver, gui, video, plots), output, as_json)
+    by = perturbation_of(perturb or [])
     loaded = load_trajectory(trajectory)
     account = account_of(recorded_robot(loaded, str(trajectory)), loaded)
     compliance.for_trajectory(account.robot, loaded)  # refused before anything is written
@@ -95,10 +99,11 @@ def validate(
         str(trajectory),
         *_changes(engine, compliance, k),
         *(["--check-solver"] * check_solver),
+        *(word for text in described(by) for word in ("--perturb", text)),
         *(["--video"] * video),
     ]
     commands = _commands(str(loaded.meta.get("command", "")), words)
-    wish = Wish(engine, check_solver, gui, video, plots, commands, compliance)
+    wish = Wish(engine, check_solver, gui, video, plots, commands, compliance, by)
     with output_folder(output or beside, "validate", account.robot.name) as folder:
         check = simulate_to_files(account, folder, beside / "validation.json", wish)
     if as_json:

@@ -16,12 +16,14 @@ from screwkin.model.state import State
 class Command:
     """Commands to the joints for one step: q (n,) at its start, qd (n,) through it [rad or m, per s].
 
-    T_world_base (4, 4) is where the plan sees the base; a backend with physics takes no notice of it.
+    T_world_base (4, 4) is where the plan sees the base; a backend with physics takes no notice of it. force
+    (3,): on the base link's CoM through the step, world axes [N]; None for none.
     """
 
     q: Any
     qd: Any
     T_world_base: Any
+    force: Any = None
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import Pose, Vector, as_array
+from screwkin.errors import InputError
 from screwkin.model.robot import Joint, Link, Robot
 
 LEAST = 1e-12
@@ -90,6 +91,32 @@ def bodies_of(robot: Robot) -> tuple[tuple[SimBody, ...], tuple[str, ...]]:
         bodies.append(SimBody(link, parent, (*joints, joint), frames[joint.child]))
     light_links = [body.link for body in bodies if body.link.name in light]
     return tuple(bodies), _remarks(sorted(merged), light_links, [x.name for x in robot.links if x.spring])
+
+
+def check_feet(robot: Robot, soles: bool = False) -> None:
+    """Refuse a robot whose feet would sink into the floor.
+
+    Args:
+        robot: to stand.
+        soles: whether a sole serves where the link has no box.
+
+    Raises:
+        InputError: a leg has nothing to stand on.
+    """
+    shod = {sole.limb for sole in robot.soles} if soles else set()
+    legs = [limb for limb in robot.limbs if limb.kind == "leg" and limb.name not in shod]
+    bare = [limb for limb in legs if not robot.link(limb.link).boxes]
+    if bare:
+        names = ", ".join(f"link {limb.link} of limb {limb.name}" for limb in bare)
+        has, give = (
+            ("neither box nor sole", "Give the limb a [[sole]], or the link a box")
+            if soles
+            else ("no box", "Give the link a box")
+        )
+        raise InputError(
+            f"robot {robot.name}: {names} has {has}, so it would sink into the floor. "
+            f"{give} whose bottom is the sole."
+        )
 
 
 def _is_bracket(robot: Robot, name: str) -> bool:

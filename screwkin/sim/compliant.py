@@ -46,6 +46,7 @@ class SpringServos:
     """Springs and dampers for servos, in any engine."""
 
     name = "springs"
+    relative_rotors = False
 
     def __init__(self, robot: Robot, compliance: Compliance, dt: float = STEP) -> None:
         """Springs that steps of dt [s] can simulate.

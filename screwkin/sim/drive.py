@@ -51,6 +51,8 @@ class Servos(Protocol):
     name: str
     rotor_inertia: Array
     """Inertia (n,) that every rotor adds to its joint, as seen there [kg m^2 or kg]."""
+    relative_rotors: bool
+    """Whether rotors must turn with their joints alone; else an engine may let them steady its step."""
 
     def reset(self, q: Array) -> None:
         """Servos at rest at positions (n,)."""
@@ -73,6 +75,7 @@ class RigidServos:
     """Servos that follow their commands exactly, within the efforts of the table."""
 
     name = "rigid"
+    relative_rotors = False
 
     def __init__(self, robot: Robot, gain: float = POSITION_GAIN) -> None:
         self.rotor_inertia = self._no_torque = np.zeros(len(robot.joints))

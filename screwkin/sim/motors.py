@@ -7,6 +7,7 @@ inertia; what the loop, the winding and the gears do is the law in ``screwkin.mo
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,11 +16,14 @@ from screwkin.errors import InputError
 from screwkin.motors.law import drive, load_torque
 from screwkin.motors.records import Motor, stacked
 from screwkin.sim.backend import Command
+from screwkin.sim.delay import DelayLine
 from screwkin.sim.drive import Actuation
 
 
 class MotorServos:
     """A motor with its firmware at every joint."""
+
+    relative_rotors = True
 
     def __init__(self, motors: Sequence[Motor], dt: float, name: str) -> None:
         """Servos in table order, for steps of at most dt [s].
@@ -27,8 +31,9 @@ class MotorServos:
         Raises:
             InputError: none, or the step is too long for them.
         """
-        self.name = name
+        self.name, self._motors, self._dt = name, tuple(motors), dt
         self._motor = motor = stacked(motors)
+        self._line = DelayLine(motor.lag, dt)
         self.rotor_inertia = motor.armature
         _check_step(motor, dt)
         self._still = np.zeros(len(motors))
@@ -37,29 +42,25 @@ class MotorServos:
     def reset(self, q: Array) -> None:
         """Servos at rest at positions (n,), with no load."""
         self._qd, self._torque, self._loaded = self._still, self._still, False
-        self._goals: list[Array] = []
+        self._line.reset()
+
+    @property
+    def lag(self) -> Array:
+        """From a goal to its effect (n,) [s]."""
+        return np.asarray(self._motor.lag)
+
+    def at_once(self) -> MotorServos:
+        """The same motors without their lag."""
+        return MotorServos([replace(motor, lag=0.0) for motor in self._motors], self._dt, self.name)
 
     def actuate(self, q: Array, qd: Array, motor: Array, command: Command, dt: float) -> Actuation:
         """The winding's torque, and friction as a bounded motor that wants rate zero."""
         external = self._still
         if self._loaded:
             external = load_torque(self._motor, self._torque, motor, (qd - self._qd) / dt)
-        torque, budget = drive(self._motor, self._goal(np.asarray(command.q), dt), q, qd, external)
+        torque, budget = drive(self._motor, self._line.through(np.asarray(command.q)), q, qd, external)
         self._qd, self._torque, self._loaded = qd, torque, True
         return Actuation(torque, self._still, budget)
-
-    def _goal(self, newest: Array, dt: float) -> Array:
-        """What the servos act on (n,): the goal of a lag ago, between two steps where it falls there."""
-        steps = self._motor.lag / dt
-        if not steps.any():
-            return newest
-        count = int(np.ceil(steps.max())) + 1
-        self._goals = [newest, *self._goals[: count - 1]]
-        past = np.array(self._goals)
-        ago = np.minimum(steps, len(past) - 1)
-        low = np.minimum(ago.astype(int), max(len(past) - 2, 0))
-        high, joints = np.minimum(low + 1, len(past) - 1), np.arange(len(newest))
-        return np.asarray(past[low, joints] + (ago - low) * (past[high, joints] - past[low, joints]))
 
 
 def _check_step(motor: Motor, dt: float) -> None:

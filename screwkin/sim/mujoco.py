@@ -27,11 +27,12 @@ from screwkin.model.inertias import impossible
 from screwkin.model.robot import Joint, Robot
 from screwkin.model.state import State
 from screwkin.sim.backend import Command, Contact, Observation, moment_about_origin
-from screwkin.sim.bodies import SimBody, bodies_of
+from screwkin.sim.bodies import SimBody, bodies_of, check_feet
 from screwkin.sim.couplings import STIFF, couple_in_mujoco
 from screwkin.sim.drive import UNLIMITED, RigidServos, Servos, motored
-from screwkin.sim.floor import floor_in_mujoco
+from screwkin.sim.floor import contact_spring, floor_in_mujoco
 from screwkin.sim.loops import close_in_mujoco
+from screwkin.sim.perturbation import NONE, Perturbation, noted
 
 CORNER = 1e-4
 """Radius [m] of the spheres that stand for the corners of a sole that no box has."""
@@ -75,6 +76,7 @@ class MuJoCoBackend:
         gui: bool = False,
         servos: Servos | None = None,
         terrain: Terrain = FLAT,
+        perturbation: Perturbation = NONE,
     ) -> None:
         """Build the world.
 
@@ -84,6 +86,7 @@ class MuJoCoBackend:
             gui: show a window.
             servos: of the joints; rigid by default.
             terrain: to stand on.
+            perturbation: its slope and restitution; ``analysis.engines.opened`` applies the rest.
 
         Raises:
             MissingDependencyError: mujoco is not installed.
@@ -101,8 +104,10 @@ class MuJoCoBackend:
         self.settings: Mapping[str, Any] = {
             **asdict(self._physics),
             "remarks": [*remarks, *(f"inertia balanced of {name}" for name in _unbalanced(robot))],
+            **noted(perturbation),
         }
-        spec = _world(mj, self._physics, terrain)
+        self._gravity = perturbation.gravity(self._physics.gravity)
+        spec = _world(mj, self._physics, terrain, self._gravity, perturbation.restitution)
         _add_bodies(mj, spec, robot, bodies, self._servos.rotor_inertia * self._motored)
         ends = {body.link.name: (spec.body(_body_name(body.link.name)), body) for body in bodies}
         close_in_mujoco(mj, spec, robot, ends)
@@ -153,6 +158,8 @@ class MuJoCoBackend:
         q, qd = data.qpos[self._qpos], data.qvel[self._dof]
         action = self._servos.actuate(q, qd, self._motor, command, self.dt).on(self._motored)
         model.dof_frictionloss[self._dof] = np.minimum(action.bound, UNLIMITED)
+        if command.force is not None:
+            data.xfrc_applied[self._base, :3] = command.force
         mj.mj_step1(model, data)
         data.qfrc_applied[self._dof] = action.torque
         wanted, motor = np.zeros((2, model.nv))
@@ -161,6 +168,7 @@ class MuJoCoBackend:
         driven = data.efc_id[rows]
         data.efc_aref[rows] = wanted[driven]
         mj.mj_step2(model, data)
+        data.xfrc_applied[self._base, :3] = 0.0
         motor[driven] = data.efc_force[rows]
         self._motor = motor[self._dof]
         self._torque = action.torque + self._motor
@@ -217,7 +225,7 @@ class MuJoCoBackend:
         data, model = self.data, self.model
         moment, force = data.cfrc_int[body, :3], data.cfrc_int[body, 3:]
         about = data.subtree_com[model.body_rootid[body]]
-        weight = np.array([0.0, 0.0, -model.body_mass[body] * self._physics.gravity])
+        weight = model.body_mass[body] * self._gravity
         f = -force - weight
         m = -moment - moment_about_origin(about, force) - moment_about_origin(data.xipos[body], weight)
         return np.concatenate([m, f])
@@ -229,13 +237,13 @@ class MuJoCoBackend:
             self._window = None
 
 
-def _world(mj: Any, physics: MuJoCoPhysics, terrain: Terrain) -> Any:
+def _world(mj: Any, physics: MuJoCoPhysics, terrain: Terrain, gravity: Array, restitution: float) -> Any:
     """A floor, gravity and the solver's settings."""
     spec = mj.MjSpec()
     spec.compiler.degree = False
     spec.compiler.balanceinertia = True  # of what no body can have; ``remarks`` name it
     spec.option.timestep = physics.dt
-    spec.option.gravity = [0.0, 0.0, -physics.gravity]
+    spec.option.gravity = gravity
     spec.option.integrator = mj.mjtIntegrator.mjINT_EULER
     spec.option.solver = mj.mjtSolver.mjSOL_NEWTON
     spec.option.iterations = physics.iterations
@@ -250,7 +258,7 @@ def _world(mj: Any, physics: MuJoCoPhysics, terrain: Terrain) -> Any:
         contype=1,
         conaffinity=0,
         friction=[physics.friction, 0.0, 0.0],
-        solref=[physics.contact_time, 1.0],
+        solref=contact_spring(physics.contact_time, physics.dt, restitution),
         solimp=[physics.contact_impedance, physics.contact_impedance, 1e-3, 0.5, 2.0],
         priority=1,
     )
@@ -342,18 +350,7 @@ def _check_joints(robot: Robot) -> None:
     helical = [joint.name for joint in robot.tree if joint.type == "helical"]
     if helical:
         raise InputError(f"robot {robot.name}: MuJoCo has no helical joints, but it has {', '.join(helical)}")
-    soles = {sole.limb for sole in robot.soles}
-    bare = [
-        limb
-        for limb in robot.limbs
-        if limb.kind == "leg" and not robot.link(limb.link).boxes and limb.name not in soles
-    ]
-    if bare:
-        names = ", ".join(f"link {limb.link} of limb {limb.name}" for limb in bare)
-        raise InputError(
-            f"robot {robot.name}: {names} has neither box nor sole, so it would sink into the floor. "
-            "Give the limb a [[sole]], or the link a box whose bottom is the sole."
-        )
+    check_feet(robot, soles=True)
 
 
 def mujoco_library() -> Any:

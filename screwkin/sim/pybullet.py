@@ -28,12 +28,13 @@ from screwkin.model.robot import Limb, Robot
 from screwkin.model.state import State
 from screwkin.model.urdf import urdf_frames, urdf_of_bodies
 from screwkin.sim.backend import Command, Contact, Observation, moment_about_origin
+from screwkin.sim.bodies import check_feet
 from screwkin.sim.camera import Camera
 from screwkin.sim.couplings import couple_in_pybullet
 from screwkin.sim.drive import UNLIMITED, RigidServos, Servos, motored
-from screwkin.sim.floor import floor_in_pybullet
+from screwkin.sim.floor import bounce_in_pybullet, floor_in_pybullet
 from screwkin.sim.loops import close_in_pybullet, quat_xyzw
-from screwkin.sim.motors import MotorServos
+from screwkin.sim.perturbation import NONE, Perturbation, noted
 from screwkin.sim.pybullet_look import Look
 from screwkin.sim.quiet import quiet
 from screwkin.sim.rotors import RelativeRotors, with_rotors
@@ -94,6 +95,7 @@ class PyBulletBackend:
         gui: bool = False,
         servos: Servos | None = None,
         terrain: Terrain = FLAT,
+        perturbation: Perturbation = NONE,
     ) -> None:
         """Connect and build the world.
 
@@ -103,6 +105,7 @@ class PyBulletBackend:
             gui: show a window.
             servos: of the joints; rigid by default.
             terrain: to stand on.
+            perturbation: its slope and restitution; ``analysis.engines.opened`` applies the rest.
 
         Raises:
             MissingDependencyError: pybullet is not installed.
@@ -117,11 +120,13 @@ class PyBulletBackend:
         if robot.coupled or robot.closures or self._physics.sole_stiffness is not None:
             self._physics = replace(self._physics, solver="iterative")
         self.dt = self._physics.dt
-        self.settings: Mapping[str, Any] = asdict(self._physics)
-        _check_feet(robot)
+        self._perturbation = perturbation
+        self._gravity = perturbation.gravity(self._physics.gravity)
+        self.settings: Mapping[str, Any] = asdict(self._physics) | noted(perturbation)
+        check_feet(robot)
         self._motored = motored(robot)
         rotors = self._servos.rotor_inertia * self._motored
-        steadied = not isinstance(self._servos, MotorServos)
+        steadied = not self._servos.relative_rotors
         opened = replace(robot.with_inertia_floor(), closures=())
         urdf = urdf_of_bodies(with_rotors(opened, rotors, steadied))
         self._p = _imported_pybullet()
@@ -152,7 +157,7 @@ class PyBulletBackend:
 
     def _make_floor(self, terrain: Terrain) -> tuple[int, ...]:
         p, here, physics = self._p, self._here, self._physics
-        p.setGravity(0.0, 0.0, -physics.gravity, **here)
+        p.setGravity(*self._gravity.tolist(), **here)
         p.setPhysicsEngineParameter(
             fixedTimeStep=physics.dt,
             numSolverIterations=physics.iterations,
@@ -202,6 +207,7 @@ class PyBulletBackend:
                 jointDamping=0.0,
                 lateralFriction=self._physics.friction,
                 frictionAnchor=1,
+                **bounce_in_pybullet(self._perturbation.restitution),
                 **here,
             )
         p.setJointMotorControlArray(
@@ -289,6 +295,9 @@ class PyBulletBackend:
         )
         self._applied = action.torque
         torque = np.concatenate([action.torque, np.zeros(len(self._tree) - count)])
+        if command.force is not None:
+            at, _ = p.getBasePositionAndOrientation(self._body, **here)
+            p.applyExternalForce(self._body, -1, list(command.force), at, p.WORLD_FRAME, **here)
         if self._rotors is not None:
             moment, beside = self._rotors.forces(look, torque, self.dt)
             p.applyExternalTorque(self._body, -1, moment.tolist(), p.WORLD_FRAME, **here)
@@ -349,7 +358,7 @@ class PyBulletBackend:
         else:
             force = force + motor * foot.axis_in_inertial
         T = self._pose(link[0], link[1])
-        f = np.array([0.0, 0.0, foot.mass * self._physics.gravity]) - T[:3, :3] @ force
+        f = -foot.mass * self._gravity - T[:3, :3] @ force
         return np.concatenate([moment_about_origin(T[:3, 3], f) - T[:3, :3] @ moment, f])
 
     def close(self) -> None:
@@ -357,16 +366,6 @@ class PyBulletBackend:
         if self._client >= 0:
             self._p.disconnect(**self._here)
             self._client = -1
-
-
-def _check_feet(robot: Robot) -> None:
-    bare = [limb for limb in robot.limbs if limb.kind == "leg" and not robot.link(limb.link).boxes]
-    if bare:
-        names = ", ".join(f"link {limb.link} of limb {limb.name}" for limb in bare)
-        raise InputError(
-            f"robot {robot.name}: {names} has no box, so it would sink into the floor. "
-            "Give the link a box whose bottom is the sole."
-        )
 
 
 def _check_soles(physics: Physics) -> None:

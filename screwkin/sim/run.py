@@ -16,6 +16,7 @@ from screwkin.mechanism.holds import on_floor
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 from screwkin.sim.backend import Backend, Command, Observation
+from screwkin.sim.perturbation import NONE, Perturbation
 from screwkin.trajectory import Trajectory
 
 
@@ -79,6 +80,7 @@ def simulate(
     schedule: Schedule | None = None,
     progress: Callable[[float], None] | None = None,
     start: Array | None = None,
+    perturbation: Perturbation = NONE,
 ) -> Run:
     """Play a trajectory in a backend, which stays open.
 
@@ -93,6 +95,7 @@ def simulate(
         progress: called now and then with the share done, 0 to 1.
         start: positions (n,) of the joints at first, by default the first commands. Commands that allow for
             elastic servos are no posture: in them feet would stand in the floor, which throws the robot up.
+        perturbation: of which the push is given here; the backend has the rest.
     """
     rule = schedule or Schedule()
     dt, since = backend.dt, float(trajectory.time[0])
@@ -108,7 +111,8 @@ def simulate(
     seen: list[Observation] = []
     fallen_at: float | None = None
     for k in range(count):
-        backend.step(Command(q[k], qd[k], planned[k + 1]))
+        force = perturbation.force(float(times[k]), dt)
+        backend.step(Command(q[k], qd[k], planned[k + 1], force))
         seen.append(backend.observe())
         now = float(times[k + 1])
         if progress is not None and k % 100 == 99:

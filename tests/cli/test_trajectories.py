@@ -173,6 +173,10 @@ def test_an_unknown_engine_is_refused_before_anything_is_simulated(cli, refused,
         (["--compliant", "-k", "60", "--engine", "kinematic"], "cannot simulate compliance; use pybullet"),
         (["--sole-stiffness", "2e4", "--engine", "kinematic"], "cannot simulate compliance; use pybullet"),
         (["--compliant", "-k", "1e6"], "is too long for joints of 1e+06 N m/rad"),
+        (["--perturb", "rises=1"], "Did you mean 'rise'"),
+        (["--perturb", "nowhere.toml"], "nowhere.toml"),
+        (["--perturb", "friction=0.5", "--engine", "kinematic"], "no forces to perturb"),
+        (["--perturb", "lag.kneee=0.1"], "unknown joint 'kneee'"),
     ],
 )
 def test_what_cannot_yield_so_is_told_once_and_nothing_is_written(
@@ -208,6 +212,21 @@ def test_a_robot_too_soft_for_its_weight_is_told_to_fall_in_every_run(cli):
     assert called.data["repeated"]["fallen"] == 4
     assert called.data["repeated"]["median_mm"] is None
     assert any("falls in 4 of 4 repetitions" in reason for reason in called.data["reasons"])
+
+
+def test_a_walk_that_a_push_fells_has_fallen_in_a_world_that_is_named(cli, walked, tmp_path):
+    (tmp_path / "t.npz").write_bytes((walked / "trajectory.npz").read_bytes())
+    (tmp_path / "world.toml").write_text(
+        "[perturbation]\npush = [0, 9, 0]\nfriction = 0.8\n", encoding="utf-8"
+    )
+    words = ("--perturb", "world.toml", "--perturb", "push=0,3,0", "--perturb", "push_at=0.1", "--no-plots")
+    called = cli("validate", "t.npz", "--engine", "mujoco", *words, "--json")
+    assert called.code == 3
+    assert called.data["fell_at"] > 0.1
+    settings = called.data["engine_settings"]["mujoco"]
+    assert settings["friction"] == 0.8
+    assert settings["perturbation"] == {"friction": 0.8, "push": [0.0, 3.0, 0.0], "push_at": 0.1}
+    assert any("send refuses" in warning for warning in called.data["warnings"])
 
 
 def test_a_robot_that_only_follows_orders_never_passes(cli, walked, tmp_path):

@@ -11,6 +11,7 @@ import screwkin as sk
 from screwkin.model.robot import Robot
 from screwkin.sim.backend import Command, Contact, Observation
 from screwkin.sim.kinematic import KinematicBackend
+from screwkin.sim.perturbation import Perturbation
 from screwkin.sim.run import Schedule, simulate
 from screwkin.trajectory import Trajectory
 
@@ -125,3 +126,14 @@ def test_progress_grows_to_the_end(robot: Robot, walk: Trajectory) -> None:
     simulate(robot, walk, KinematicBackend(robot, dt=0.01), progress=told.append)
     assert told == sorted(told)
     assert 0.6 < told[-1] <= 1.0
+
+
+def test_a_push_reaches_the_backend_in_the_steps_of_its_time(robot: Robot, walk: Trajectory) -> None:
+    """The impulse is that of the perturbation, where it ends within a step too."""
+    backend = Scripted([tilted(0, 0.15)], len(robot.joints))
+    by = Perturbation(push=(0.2, 0.0, -0.1), push_at=0.3, push_duration=0.045)
+    run = simulate(robot, walk, backend, perturbation=by)
+    pushed = [k for k, command in enumerate(backend.commands) if command.force is not None]
+    assert pushed == np.flatnonzero((run.time > 0.3001) & (run.time < 0.3501)).tolist()
+    impulse = sum((backend.commands[k].force for k in pushed), np.zeros(3)) * backend.dt
+    np.testing.assert_allclose(impulse, by.push)
