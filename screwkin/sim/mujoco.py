@@ -212,7 +212,7 @@ class MuJoCoBackend:
         bodies = model.geom_bodyid[touch.geom].reshape(-1, 2)
         forces = np.where(bodies[:, :1] == 0, forces, -forces)
         points = touch.pos.reshape(-1, 3)
-        for k in np.flatnonzero(wrench[:, 0] > 0.0):
+        for k in np.flatnonzero(wrench[:, 0] > 0.0).tolist():
             (x, y, z), (u, v, w) = points[k].tolist(), forces[k].tolist()
             yield Contact(self._links[int(bodies[k].max())], (x, y, z), (u, v, w))
 

@@ -176,10 +176,9 @@ class RelativeRotors:
         return np.asarray(rows.reshape(-1, S.shape[1]))
 
 
-_CROSS = np.zeros((3, 3, 3))
-_CROSS[0, 1, 2] = _CROSS[1, 2, 0] = _CROSS[2, 0, 1] = 1.0
-_CROSS[0, 2, 1] = _CROSS[1, 0, 2] = _CROSS[2, 1, 0] = -1.0
-_CROSS = _CROSS.reshape(3, 9)
+_CROSS = np.zeros((3, 9))
+_CROSS[0, 5] = _CROSS[1, 6] = _CROSS[2, 1] = 1.0
+_CROSS[0, 7] = _CROSS[1, 2] = _CROSS[2, 3] = -1.0
 
 
 def _crossed_with(points: Array) -> Array:
@@ -188,7 +187,7 @@ def _crossed_with(points: Array) -> Array:
 
 
 def _solved(matrix: Array, right: Array) -> Array:
-    """Solution of a small system with a positive definite matrix; ``np.linalg.solve`` takes four times as long."""
+    """Solution of a small positive definite system; ``np.linalg.solve`` takes four times as long."""
     from scipy.linalg.lapack import dposv
 
     return np.asarray(dposv(matrix, right)[1])

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.dynamics.terrain import Terrain
 from screwkin.gait.ground import ground_of
 from screwkin.mechanism.holds import on_floor
 from screwkin.model.robot import Robot
