@@ -96,15 +96,19 @@ class HipEquations:
 
     def quartic(self) -> tuple[Scalar, ...]:
         """Coefficients of 1, cos q1, sin q1, cos 2 q1, sin 2 q1 of |N|^2 - d^2, zero where |n| = 1."""
-        N, d = self.solution()
-        one = minus(dot(N.fixed, N.fixed), times(d[0], d[0]))
-        cosine = times(2, minus(dot(N.fixed, N.along), times(d[0], d[1])))
-        sine = times(2, minus(dot(N.fixed, N.across), times(d[0], d[2])))
-        cosine2 = minus(dot(N.along, N.along), times(d[1], d[1]))
-        sine2 = minus(dot(N.across, N.across), times(d[2], d[2]))
-        mixed = minus(dot(N.along, N.across), times(d[1], d[2]))
-        mean, difference = plus(cosine2, sine2) / 2, minus(cosine2, sine2) / 2
-        return plus(one, mean), cosine, sine, difference, mixed
+        return unit_quartic(*self.solution())
+
+
+def unit_quartic(N: Turning, d: Sequence[Scalar]) -> tuple[Scalar, ...]:
+    """Coefficients of 1, cos x, sin x, cos 2x, sin 2x of |N|^2 - d^2, for d = d0 + d1 cos x + d2 sin x."""
+    one = minus(dot(N.fixed, N.fixed), times(d[0], d[0]))
+    cosine = times(2, minus(dot(N.fixed, N.along), times(d[0], d[1])))
+    sine = times(2, minus(dot(N.fixed, N.across), times(d[0], d[2])))
+    cosine2 = minus(dot(N.along, N.along), times(d[1], d[1]))
+    sine2 = minus(dot(N.across, N.across), times(d[2], d[2]))
+    mixed = minus(dot(N.along, N.across), times(d[1], d[2]))
+    mean, difference = plus(cosine2, sine2) / 2, minus(cosine2, sine2) / 2
+    return plus(one, mean), cosine, sine, difference, mixed
 
 
 def _sum(a: Turning, b: Turning, c: Turning) -> Turning:

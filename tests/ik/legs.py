@@ -135,3 +135,29 @@ def miss(leg: Leg, q: Floats, target: Floats) -> Floats:
     T = leg.reach(q)
     turn = Rotation.from_matrix(target[:, :3, :3] @ T[:, :3, :3].swapaxes(1, 2)).magnitude()
     return np.asarray(np.hypot(turn, np.linalg.norm(T[:, :3, 3] - target[:, :3, 3], axis=1)))
+
+
+def structured_leg(kind: str, seed: int) -> Leg:
+    """Six random joints of a given structure.
+
+    Args:
+        kind: words such as ``m012`` (these axes meet in a point) and ``p34`` (these are parallel).
+        seed: of all numbers.
+    """
+    rng = np.random.default_rng([seed, *map(ord, kind)])
+    axes, points = unit(rng, 6), 0.3 * rng.normal(size=(6, 3))
+    for word in kind.split():
+        joints = [int(x) for x in word[1:]]
+        if word[0] == "p":
+            axes[joints] = axes[joints[0]] * rng.choice([-1.0, 1.0], size=(len(joints), 1))
+        else:
+            points[joints] = points[joints[0]]
+    return Leg(axes, points, random_tip(rng)).slid(0.3 * rng.normal(size=6))
+
+
+def nearly(leg: Leg, size: float, seed: int) -> Leg:
+    """Axes turned and moved by a little: what a table that was measured or rounded holds."""
+    rng = np.random.default_rng(seed)
+    axes = leg.axes + size * rng.normal(size=(6, 3))
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    return replace(leg, axes=axes, points=leg.points + 0.3 * size * rng.normal(size=(6, 3)))

@@ -17,7 +17,7 @@ from screwkin.ik.numeric import IkSettings
 from screwkin.ik.solutions import LimbSolutions
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.kinematics.status import Status
-from tests.ik.legs import Leg, apart, offset_leg, random_tip, spherical_leg, unit
+from tests.ik.legs import Leg, apart, nearly, offset_leg, random_tip, spherical_leg, unit
 from tests.laws.limbs import inside, random_robot, targets_at
 
 LOW = np.array([-2.0, -0.5, -2.0, -0.1, -0.9, -0.4])
@@ -43,14 +43,6 @@ def universal_leg() -> Leg:
     axes = leg.axes.copy()
     axes[3] = [0, np.cos(0.1), np.sin(0.1)]
     return replace(leg, axes=axes)
-
-
-def nearly(leg: Leg, size: float, seed: int) -> Leg:
-    """Axes turned and moved by a little: what a table that was measured or rounded holds."""
-    rng = np.random.default_rng(seed)
-    axes = leg.axes + size * rng.normal(size=(6, 3))
-    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-    return replace(leg, axes=axes, points=leg.points + 0.3 * size * rng.normal(size=(6, 3)))
 
 
 def random_leg(seed: int) -> Leg:

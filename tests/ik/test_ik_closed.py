@@ -24,13 +24,16 @@ from tests.ik.legs import (
     random_parallel_leg,
     random_spherical_leg,
     spherical_leg,
+    structured_leg,
 )
 
 RANDOM_LEGS = {
     **{f"parallel axes {seed}": random_parallel_leg(seed) for seed in range(4)},
     **{f"axes 2 to 4 parallel {seed}": backwards(random_parallel_leg(seed), seed) for seed in range(2)},
-    **{f"spherical hip {seed}": random_spherical_leg(seed) for seed in range(4)},
-    **{f"spherical wrist {seed}": backwards(random_spherical_leg(seed), seed) for seed in range(2)},
+    "spherical hip": random_spherical_leg(0),
+    **{f"spherical hip {kind}": structured_leg(kind, 0) for kind in ("m012", "m012 p34", "m012 p45")},
+    "spherical wrist": backwards(random_spherical_leg(0), 0),
+    "spherical wrist m345 m12": structured_leg("m345 m12", 0),
 }
 
 

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from screwkin.algebra.quartic import circle_roots
 from screwkin.algebra.se3 import UNTURNED, Pose, Vector, as_array, cross, dot, rotate
+from screwkin.ik.point_turns import point_turns
 from screwkin.ik.spherical_hip import spherical_hip_branches
 from screwkin.ik.subproblems import three_turns, turn_onto, turns_to_level, two_turns
 from screwkin.kinematics.serial_chain import SerialChain
@@ -112,9 +113,11 @@ def test_three_turns_make_the_rotation_and_one_triple_is_the_given_one(seed):
 def knee(x, y, z):
     """First branch of a spherical leg for an upright foot at (x, y, z)."""
     chain = SerialChain.of(load_robot("bioloid"), "left_leg")
-    hip, ankle = chain.screws[0].s0, chain.screws[5].s0
+    hip = chain.screws[0].s0
+    turns = point_turns(chain, (3, 4, 5), hip)
+    assert callable(turns)
     D = Pose(UNTURNED, Vector(x, y, z) - chain.tip.p)
-    return spherical_hip_branches(chain.screws, hip, ankle, D)[0][:6]
+    return spherical_hip_branches(chain.screws, hip, turns, D)[0][:6]
 
 
 def test_one_formula_serves_numbers_batches_symbols_and_gradients(x64):

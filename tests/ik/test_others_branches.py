@@ -20,13 +20,25 @@ from tests.ik.legs import (
     Leg,
     apart,
     backwards,
+    nearly,
     offset_leg,
     random_parallel_leg,
     random_spherical_leg,
     spherical_leg,
+    structured_leg,
 )
 
 SAME, EXACT, REGULAR = 1e-5, 1e-7, 1e-3
+SOLVED_BY_BOTH = ("m012 p34", "m012 p45", "m012 m34", "m345 p12", "m345 p01", "m345 m12")
+"""Three axes that meet at one end, and two others that meet or are parallel; see ``structured_leg``."""
+STRUCTURES = (
+    *SOLVED_BY_BOTH,
+    *("m012", "m123", "m234", "m345", "m012 m45", "m345 m01", "m234 p01", "m123 p45", "m123 m45", "m234 m01"),
+    *("p012", "p123", "p234", "p345", "p123 m45", "p234 m01", "p123 m01 m45", "p012 m45", "p345 m01"),
+    *("m01 m23 m45", "p12 p34", "m01 m12 p34", "m012 m234", "m012 m345"),
+)
+NEARLY = (0.0, 1e-9, 1e-6, 1e-3)
+"""By how much axes fail to be parallel [rad] and to meet."""
 
 
 def compared(chain: SerialChain, poses: int) -> tuple[int, int]:
@@ -82,6 +94,32 @@ def test_branches_of_special_legs(leg: Leg) -> None:
     assert_all_of_eaik_s_branches_are_found(backwards(leg, 1).chain())
 
 
+@pytest.mark.parametrize("kind", SOLVED_BY_BOTH)
+def test_branches_of_limbs_with_three_axes_that_meet(kind: str) -> None:
+    found, missed = compared(structured_leg(kind, 0).chain(), 3)
+    assert found
+    assert not missed
+
+
+def own_missed(chain: SerialChain, poses: int, seed: int) -> int:
+    """How many random regular positions are not among the branches of their own poses."""
+    q = np.random.default_rng(seed).uniform(-np.pi, np.pi, (poses, 6))
+    found = solve_limb_arrays(chain, poses_of(chain, q), "auto", np.zeros(6), IkSettings(), True)
+    own = ((apart(found.q, q[:, None]) < SAME) & found.valid).any(axis=1)
+    return sum(conditioning(chain, x) > REGULAR for x in q[~own])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("near", NEARLY)
+@pytest.mark.parametrize("kind", STRUCTURES)
+def test_branches_of_random_structures(kind: str, near: float) -> None:
+    """Five limbs of every structure: what EAIK finds, and the own branch of every pose."""
+    for seed in range(5):
+        chain = nearly(structured_leg(kind, seed), near, seed).chain()
+        assert compared(chain, 3)[1] == 0, seed
+        assert own_missed(chain, 50, seed) == 0, seed
+
+
 @pytest.mark.parametrize("name", ["bioloid", "poppy12"])
 def test_branches_of_bundled_legs(name: str) -> None:
     robot = sk.load_robot(name)
@@ -126,7 +164,6 @@ def chain_of(screws: list[Screw], name: str) -> SerialChain:
 
 @pytest.mark.robots
 def test_branches_of_public_robots() -> None:
-    """But for a few next to singular positions of limbs whose wrist is in their middle."""
     found, missed, seen = 0, 0, set()
     for chain in chains_of(robots_folder()):
         key = np.round([[*s.s, *(s.s0 - chain.tip.p)] for s in chain.screws], 6).tobytes()
@@ -135,7 +172,8 @@ def test_branches_of_public_robots() -> None:
             counts = compared(chain, 5)
             found, missed = found + counts[0], missed + counts[1]
     assert found > 100
-    assert missed <= 0.02 * found, (found, missed)
+    print(f"{found + missed} branches of {len(seen)} limbs, {missed} missed")  # shown by -s
+    assert not missed
 
 
 def robots_folder() -> Path:
