@@ -37,6 +37,8 @@ DRIVERS = {
     "pybullet": ("screwkin.sim.pybullet",),
     "pybullet_data": ("screwkin.sim.pybullet",),
     "mujoco": ("screwkin.sim.mujoco", "screwkin.model.mjcf_in"),
+    "dask": ("screwkin.analysis.cluster",),
+    "distributed": ("screwkin.analysis.cluster",),
     "trimesh": ("screwkin.model.meshes",),
     "collada": ("screwkin.model.meshes",),
     "serial": ("screwkin.servo.bus",),

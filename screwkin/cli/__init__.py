@@ -30,6 +30,7 @@ VERBS = {
     "walk": "Plan the trajectory of a gait, with plots and a report.",
     "zmp": "Recompute CoM, ZMP, margins and spikes of a trajectory.",
     "validate": "Simulate a trajectory and give a verdict.",
+    "sweep": "Simulate a walk under many settings and seeds, and count the falls.",
     "workspace": "Where a foot can go, held level, and which joint limit cuts there.",
     "stiffness": "Deflection of a foot on elastic joints, all over its workspace.",
     "codegen": "A robot's formulas as C, for other programs and microcontrollers.",

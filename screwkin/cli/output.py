@@ -98,14 +98,17 @@ def aligned(rows: Sequence[Sequence[Any]], indent: str = "") -> str:
 
 @contextmanager
 def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
-    """A bar on stderr while it is a terminal, else nothing; yields a function that takes the share done."""
+    """A bar, percent and remaining time on stderr while it is a terminal, else nothing.
+
+    Yields a function that takes the share done.
+    """
     if not sys.stderr.isatty():
         yield lambda share: None
         return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
         task = shown.add_task(label.replace("[", r"\["), total=1.0)
         yield lambda share: shown.update(task, completed=share)

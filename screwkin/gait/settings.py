@@ -43,7 +43,7 @@ def place(document: dict[str, Any], key: str, value: Any, optional: Iterable[str
     if last not in holder:
         return False
     if len(names) == depth:
-        holder[last] = _items(value) if isinstance(value, str) else value
+        holder[last] = items_of(value) if isinstance(value, str) else value
         return True
     index = names[depth]
     if not index.isdecimal() or int(index) >= len(holder[last]):
@@ -52,7 +52,7 @@ def place(document: dict[str, Any], key: str, value: Any, optional: Iterable[str
     return True
 
 
-def _items(text: str) -> list[str]:
+def items_of(text: str) -> list[str]:
     """Entries of a list written as text, divided at commas outside parentheses."""
     items, depth = [""], 0
     for character in text.strip().removeprefix("[").removesuffix("]"):

@@ -1,0 +1,261 @@
+"""``screwkin sweep``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from screwkin.analysis.campaign import Axes, Campaign, axis_values, check_size, load_seeds, seeds_from
+from screwkin.analysis.campaign_outcome import Outcome
+from screwkin.analysis.campaign_row import gait_of, played
+from screwkin.analysis.campaign_run import Workers, local_workers, outcomes
+from screwkin.analysis.campaign_sheet import finished, rows_arrays, rows_csv, settings_csv
+from screwkin.analysis.campaign_statistics import Paired, Tally, comparisons, tallies, tally
+from screwkin.analysis.campaign_store import Journal, journal
+from screwkin.analysis.engines import RIGID, SimulatedCompliance
+from screwkin.cli.folder import output_folder
+from screwkin.cli.options import AsJson, OutputFolder, RobotName, settings
+from screwkin.cli.output import aligned, drawn, print_json, progress_bar, remark
+from screwkin.cli.simulation import engine as engine_named
+from screwkin.cli.walk import limbed
+from screwkin.errors import InputError
+from screwkin.files import atomic_write, atomic_write_bytes, npz_bytes, versions
+from screwkin.gait.files import default_gait, load_gait
+from screwkin.gait.fitting import fitting_gait
+from screwkin.gait.record import Gait
+from screwkin.model.robot import Robot, robot_text
+from screwkin.model.table import load_robot
+
+TRACED = ("screwkin", "numpy", "scipy", "pybullet", "mujoco")
+"""What computes the rows; rows of other versions are not mixed with them."""
+AUTO = "--auto"
+"""The gait that fits the robot, as the axis ``gait`` names it."""
+SHOWN = 40
+"""Settings that are printed; all of them stand in settings.csv."""
+
+
+def sweep(
+    robot: RobotName,
+    gait: Annotated[
+        str | None,
+        typer.Option(metavar="NAME|FILE", help="A bundled gait's name or a file; default: ROBOT-… or walk."),
+    ] = None,
+    auto: Annotated[
+        bool, typer.Option("--auto", help="A gait that fits the robot; limbs are found where none are named.")
+    ] = False,
+    assignments: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            metavar="KEY=VALUES",
+            help="A parameter of the gait, or gait, engine, servo: FROM:TO:STEP, a list A,B, or one value; "
+            "may be repeated, for a grid.",
+        ),
+    ] = None,
+    runs: Annotated[int | None, typer.Option(help="Runs of every setting; default: 1.")] = None,
+    seed: Annotated[
+        int | None, typer.Option(help="What the seeds of the runs follow from; default: 0.")
+    ] = None,
+    seeds: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="The seeds themselves, one a line, instead of --runs and --seed."),
+    ] = None,
+    engine: Annotated[str, typer.Option(help="As of validate.")] = "auto",
+    servo: Annotated[str, typer.Option(help="As of validate: rigid, table, or a servo model.")] = RIGID,
+    jobs: Annotated[int | None, typer.Option(help="Processes on this computer; default: 1.")] = None,
+    cluster: Annotated[
+        str | None,
+        typer.Option(metavar="ADDRESS", help="Of a dask.distributed scheduler, whose workers play the rows."),
+    ] = None,
+    plots: Annotated[bool, typer.Option("--plots/--no-plots", help="Draw the pictures.")] = True,
+    output: OutputFolder = None,
+    as_json: AsJson = False,
+) -> int:
+    """Simulate a walk under many settings and seeds, and count the falls.
+
+    Every combination of --set values is a setting; every setting is played with every seed. The same command
+    with the same -o goes on where it was stopped, however it was. Files: campaign.json, rows.jsonl (as rows
+    end), rows.csv and rows.npz, settings.csv and pictures. Exit code 1 if a row crashed.
+    """
+    table = load_robot(robot)
+    if auto and not table.limbs:
+        table = limbed(table)
+    _refuse_together({"--auto": auto, "--gait": gait, "--set gait": _sets(assignments or [], "gait")})
+    _refuse_together({"--seeds": seeds, "--runs": runs})
+    _refuse_together({"--seeds": seeds, "--seed": seed})
+    _refuse_together({"--jobs": jobs, "--cluster": cluster})
+    axes = _axes(
+        assignments or [],
+        {"gait": AUTO if auto else gait or default_gait(table.name), "engine": engine, "servo": servo},
+    )
+    campaign = _campaign(table, axes, _seeds(seeds, seed or 0, 1 if runs is None else runs))
+    if jobs is not None and jobs < 1:
+        raise InputError(f"--jobs {jobs}: at least one process plays the rows")
+    with output_folder(output, "sweep", table.name) as folder:
+        with journal(folder, campaign) as rows:
+            with _workers(jobs or 1, cluster) as workers:
+                _play(campaign, rows, workers)
+            done = rows.outcomes
+        _write(campaign, done, folder)
+        if plots:
+            drawn(lambda: _draw(campaign, done, folder))
+    total, each = tally([*done.values()]), tallies(campaign, done)
+    pairs = [*comparisons(campaign, done)]
+    if as_json:
+        print_json({**_data(campaign, total, each, pairs), "folder": str(folder)})
+    else:
+        _print(campaign, total, each, pairs)
+        print(f"files in {folder}: {', '.join(sorted(p.name for p in folder.iterdir() if p.is_file()))}")
+    for line in _crashes(done):
+        remark(line)
+    return 1 if total.crashed else 0
+
+
+def _refuse_together(options: Mapping[str, object]) -> None:
+    """Refuse options that exclude each other, if several are given: those that are neither None nor False."""
+    given = [name for name, value in options.items() if value is not None and value is not False]
+    if len(given) > 1:
+        raise InputError(f"{' and '.join(given)} exclude each other; give one of them")
+
+
+def _sets(assignments: Sequence[str], key: str) -> bool:
+    return any(text.partition("=")[0].strip() == key for text in assignments)
+
+
+def _seeds(path: Path | None, seed: int, runs: int) -> tuple[int, ...]:
+    if runs < 1:
+        raise InputError(f"--runs {runs}: expected a whole number, at least 1")
+    return seeds_from(seed, runs) if path is None else load_seeds(path)
+
+
+def _axes(assignments: Sequence[str], defaults: Mapping[str, str]) -> Axes:
+    """The axes of the grid: conditions first, then the gait's parameters as they were given.
+
+    Raises:
+        InputError: an assignment is none, or a range.
+    """
+    given = {key: axis_values(key, text) for key, text in settings(list(assignments)).items()}
+    return {key: (text,) for key, text in defaults.items()} | given
+
+
+def _campaign(robot: Robot, axes: Axes, seeds: tuple[int, ...]) -> Campaign:
+    """The plan, with every setting checked before anything is played.
+
+    Raises:
+        UnknownNameError, GaitError, InputError: a gait, engine, servo, key or value is wrong.
+    """
+    check_size(axes, len(seeds))
+    for name in axes["engine"]:
+        engine_named(name)
+    for name in axes["servo"]:
+        SimulatedCompliance().on(name).motors_of(robot)
+    gaits = {name: json.dumps(_gait(robot, name).to_dict()) for name in axes["gait"]}
+    campaign = Campaign(robot_text(robot), gaits, axes, seeds, versions(*TRACED))
+    for values in campaign.settings:
+        gait_of(campaign, values)
+    return campaign
+
+
+def _gait(robot: Robot, name: str) -> Gait:
+    return fitting_gait(robot) if name == AUTO else load_gait(name)
+
+
+def _workers(jobs: int, address: str | None) -> AbstractContextManager[Workers]:
+    """Processes of this computer, or those of a cluster."""
+    if address is None:
+        return nullcontext(local_workers(jobs))
+    from screwkin.analysis.cluster import cluster_workers
+
+    return cluster_workers(address)
+
+
+def _play(campaign: Campaign, rows: Journal, workers: Workers) -> None:
+    """Play what has not ended yet."""
+    left = [row for row in campaign.rows if row.index not in rows.outcomes]
+    if rows.outcomes:
+        remark(
+            f"{len(rows.outcomes):,} of {len(campaign.rows):,} rows have ended before; {len(left):,} are left"
+        )
+    with progress_bar("campaign") as done:
+        for k, outcome in enumerate(outcomes(partial(played, campaign), left, workers), 1):
+            rows.append(outcome)
+            done(k / len(left))
+
+
+def _write(campaign: Campaign, done: Mapping[int, Outcome], folder: Path) -> None:
+    rows = finished(campaign, done)
+    for name, text in (
+        ("rows.csv", rows_csv(campaign, rows)),
+        ("settings.csv", settings_csv(campaign, tallies(campaign, done))),
+    ):
+        with atomic_write(folder / name) as file:
+            file.write(text)
+    with atomic_write_bytes(folder / "rows.npz") as binary:
+        binary.write(npz_bytes(rows_arrays(campaign, rows)))
+
+
+def _draw(campaign: Campaign, done: Mapping[int, Outcome], folder: Path) -> list[Path]:
+    from screwkin.report.campaigns import campaign_pictures
+    from screwkin.report.style import save_figure, styled
+
+    with styled():
+        pictures = campaign_pictures(campaign, done)
+        return [save_figure(draw(), folder / name) for name, draw in pictures.items()]
+
+
+def _data(campaign: Campaign, total: Tally, each: Sequence[Tally], pairs: Sequence[Paired]) -> dict[str, Any]:
+    """The campaign as JSON data."""
+    counted = [{"values": values, **t.to_dict()} for values, t in zip(campaign.settings, each, strict=True)]
+    return {
+        "rows": total.rows,
+        "falls": total.fell,
+        "interval": total.interval,
+        **{
+            name: value for name, value in total.to_dict().items() if name not in ("rows", "fell", "interval")
+        },
+        "settings": counted,
+        "paired": [pair.to_dict() for pair in pairs],
+    }
+
+
+def _print(campaign: Campaign, total: Tally, each: Sequence[Tally], pairs: Sequence[Paired]) -> None:
+    """The table of settings, and how they compare."""
+    keys = campaign.varied
+    lines: list[Sequence[str]] = [("setting", *keys, *_HEAD)]
+    for k, (values, t) in enumerate(zip(campaign.settings, each, strict=True)):
+        lines.append((str(k), *(values[key] for key in keys), *_cells(t)))
+    shown = lines[: SHOWN + 1]
+    if len(each) > 1:
+        shown.append(("all", *("" for _ in keys), *_cells(total)))
+    print(aligned(shown, "  "))
+    if len(lines) > len(shown):
+        print(f"  … {len(lines) - SHOWN - 1} more settings in settings.csv")
+    for pair in pairs[:SHOWN]:
+        print(
+            f"  setting {pair.second} against {pair.first} on {pair.pairs} equal seeds: alone fell "
+            f"{pair.only_second} against {pair.only_first}, p = {pair.p:.2g} (McNemar)"
+        )
+
+
+_HEAD = ("rows", "falls", "95 % interval", "pass", "refused", "crashed", "margin")
+
+
+def _cells(t: Tally) -> tuple[str, ...]:
+    interval = "" if t.interval is None else f"{100 * t.interval[0]:.1f} to {100 * t.interval[1]:.1f} %"
+    margin = "" if t.margin_mm is None else f"{t.margin_mm:.1f} mm"
+    return str(t.rows), str(t.fell), interval, str(t.passed), str(t.refused), str(t.crashed), margin
+
+
+def _crashes(done: Mapping[int, Outcome]) -> list[str]:
+    """A line for each reason of a crash, with the first row of it."""
+    first: dict[str, int] = {}
+    for index in sorted(done):
+        if done[index].status == "crashed":
+            first.setdefault(done[index].reason, index)
+    return [f"crashed, row {index}: {reason}" for reason, index in first.items()]

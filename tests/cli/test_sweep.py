@@ -1,0 +1,67 @@
+"""``screwkin sweep``: a grid of settings and seeds, its files, and how it goes on."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import numpy as np
+import pytest
+
+GRID = ("sweep", "bioloid", "--gait", "walk", "--engine", "kinematic", "--set", "steps=1", "--set", "rate=20")
+
+
+def test_a_campaign_leaves_its_rows_and_what_has_ended_is_not_played_again(cli, tmp_path):
+    words = (*GRID, "--set", "Tc=1:1.2:0.2", "--runs", 3, "--seed", 4, "-o", "c")
+    called = cli(*words, "--json")
+    assert called.code == 0, called.err
+    data, folder = called.data, tmp_path / "c"
+    assert (data["rows"], data["falls"], data["interval"]) == (6, 0, None)
+    assert (data["planned"], data["refused"], data["crashed"]) == (6, 0, 0)
+    assert [setting["values"]["Tc"] for setting in data["settings"]] == ["1", "1.2"]
+    names = {"campaign.json", "rows.jsonl", "rows.csv", "rows.npz", "settings.csv", "falls.png"}
+    assert {path.name for path in folder.iterdir()} == names
+    with (folder / "rows.csv").open(newline="") as file:
+        rows = [*csv.DictReader(file)]
+    assert [row["Tc"] for row in rows] == ["1"] * 3 + ["1.2"] * 3
+    assert len({row["seed"] for row in rows}) == 3
+    assert np.load(folder / "rows.npz")["margin_mm"].shape == (6,)
+
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    with (folder / "rows.jsonl").open("a") as file:
+        file.write('{"row": 6, "stat')
+    again = cli(*words)
+    assert again.code == 0
+    assert "6 of 6 rows have ended before; 0 are left" in again.err
+    assert "on 0 equal seeds" in again.out
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--set", "Tc=1:2"), "--set Tc=1:2 is no range"),
+        (("--set", "strid=0.1,0.2"), "no such parameter"),
+        (("--set", "Tc=fast"), "fast"),
+        (("--set", "engine=kinematic,odd"), "unknown engine 'odd'"),
+        (("--set", "servo=rigid,odd"), "odd"),
+        (("--runs", "0"), "--runs 0"),
+        (("--jobs", "0"), "--jobs 0"),
+        (("--auto",), "--auto and --gait exclude each other"),
+        (("--jobs", "2", "--cluster", "tcp://localhost:1"), "--jobs and --cluster"),
+        (("--seeds", "seeds.txt", "--runs", "3"), "--seeds and --runs"),
+        (("--set", "gait=walk,smooth"), "--gait and --set gait"),
+    ],
+)
+def test_a_campaign_that_cannot_be_played_is_refused_before_it_begins(cli, tmp_path, refused, words, message):
+    (tmp_path / "seeds.txt").write_text("1\n2\n")
+    assert message in refused(cli(*GRID, *words, "-o", "c"), 2)
+    assert not (tmp_path / "c").exists()
+
+
+def test_a_folder_of_another_campaign_is_left_as_it_is(cli, tmp_path, refused):
+    (tmp_path / "c").mkdir()
+    (tmp_path / "c" / "campaign.json").write_text(json.dumps({"robot": "other"}))
+    message = refused(cli(*GRID, "-o", "c"), 2)
+    assert "another campaign" in message
+    assert [path.name for path in (tmp_path / "c").iterdir()] == ["campaign.json"]
