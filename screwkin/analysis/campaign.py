@@ -23,7 +23,7 @@ from screwkin.gait.settings import items_of
 
 MOST_ROWS = 1_000_000
 """Rows of a campaign; a slip in a range would plan more."""
-CONDITIONS = ("gait", "engine", "servo")
+CONDITIONS = ("gait", "engine", "servo", "perturb")
 """Keys of a setting that are no parameters of its gait."""
 
 Axes = Mapping[str, tuple[str, ...]]

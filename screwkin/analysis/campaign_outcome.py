@@ -19,7 +19,8 @@ class Outcome:
     status: ``stood`` or ``fell`` in the simulation; ``planned``, the engine has no forces, so that nobody
     knows; ``refused``, there is no such walk; ``crashed``, the program failed. passed: every criterion of
     ``validate`` holds. reason: what speaks against it. Lengths in mm, times in s, angles in deg; None where
-    nothing was measured.
+    nothing was measured. world: what differs from the plan, as ``validate --perturb`` takes it, with blanks
+    between.
     """
 
     row: int
@@ -32,13 +33,16 @@ class Outcome:
     end_error_mm: float | None = None
     slip_mm: float | None = None
     tilt_deg: float | None = None
+    world: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON data."""
         return asdict(self)
 
 
-MEASURES = tuple(f.name for f in fields(Outcome) if f.name not in ("row", "status", "passed", "reason"))
+MEASURES = tuple(
+    f.name for f in fields(Outcome) if f.name not in ("row", "status", "passed", "reason", "world")
+)
 """Fields of an outcome that were measured."""
 
 

@@ -7,8 +7,11 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import cast
 
+import numpy as np
+
 from screwkin.analysis.campaign import CONDITIONS, Campaign, Row
 from screwkin.analysis.campaign_outcome import Outcome, crashed
+from screwkin.analysis.campaign_world import world_of
 from screwkin.analysis.engines import Engine, confirms
 from screwkin.analysis.validate import Validation, validate
 from screwkin.errors import NoSolutionError
@@ -16,6 +19,8 @@ from screwkin.gait.record import Gait, gait_from_dict
 from screwkin.gait.walk import walk
 from screwkin.model.robot import Robot
 from screwkin.model.table import robot_from_text
+from screwkin.sim.perturbation import Perturbation
+from screwkin.sim.perturbation_files import described
 from screwkin.trajectory import Trajectory
 
 
@@ -23,8 +28,9 @@ def played(campaign: Campaign, row: Row) -> Outcome:
     """Play a row; whatever goes wrong in it is its outcome."""
     try:
         robot, trajectory = _robot(campaign.robot), planned(campaign, row.values)
-        engine = cast(Engine, row.values["engine"])
-        return _outcome(row, validate(robot, trajectory, engine, servo=row.values["servo"]))
+        engine, servo = cast(Engine, row.values["engine"]), row.values["servo"]
+        world = _world(row, robot, trajectory)
+        return _outcome(row, validate(robot, trajectory, engine, servo=servo, perturbation=world), world)
     except NoSolutionError as error:
         return Outcome(row.index, "refused", reason=str(error))
     except Exception as error:
@@ -77,7 +83,14 @@ def _planned(
         return error
 
 
-def _outcome(row: Row, check: Validation) -> Outcome:
+def _world(row: Row, robot: Robot, trajectory: Trajectory) -> Perturbation:
+    way = trajectory.T_world_base[:, 0, 3]
+    return world_of(
+        row.values["perturb"], robot, row.seed, trajectory.duration, float(np.abs(way - way[0]).max())
+    )
+
+
+def _outcome(row: Row, check: Validation, world: Perturbation) -> Outcome:
     return Outcome(
         row=row.index,
         status="planned" if not confirms(check.engine) else "fell" if check.fell else "stood",
@@ -89,4 +102,5 @@ def _outcome(row: Row, check: Validation) -> Outcome:
         end_error_mm=check.end_error_mm,
         slip_mm=check.slip_mm,
         tilt_deg=check.max_tilt_deg,
+        world=" ".join(described(world)),
     )

@@ -18,6 +18,7 @@ from screwkin.analysis.campaign_run import Workers, local_workers, outcomes
 from screwkin.analysis.campaign_sheet import finished, rows_arrays, rows_csv, settings_csv
 from screwkin.analysis.campaign_statistics import Paired, Tally, comparisons, tallies, tally
 from screwkin.analysis.campaign_store import Journal, journal
+from screwkin.analysis.campaign_world import AS_PLANNED, check_world
 from screwkin.analysis.engines import RIGID, SimulatedCompliance
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, RobotName, settings
@@ -54,8 +55,8 @@ def sweep(
         typer.Option(
             "--set",
             metavar="KEY=VALUES",
-            help="A parameter of the gait, or gait, engine, servo: FROM:TO:STEP, a list A,B, or one value; "
-            "may be repeated, for a grid.",
+            help="A parameter of the gait, or gait, engine, servo, perturb: FROM:TO:STEP, a list A,B, or one "
+            "value; may be repeated, for a grid.",
         ),
     ] = None,
     runs: Annotated[int | None, typer.Option(help="Runs of every setting; default: 1.")] = None,
@@ -65,6 +66,14 @@ def sweep(
     seeds: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="The seeds themselves, one a line, instead of --runs and --seed."),
+    ] = None,
+    perturb: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="WORDS",
+            help="Worlds other than the planned one, drawn from the seed: x1, or x3 for thrice as far; "
+            "KEY~VALUE draws a figure, KEY=VALUE is as of validate; may be repeated.",
+        ),
     ] = None,
     engine: Annotated[str, typer.Option(help="As of validate.")] = "auto",
     servo: Annotated[str, typer.Option(help="As of validate: rigid, table, or a servo model.")] = RIGID,
@@ -87,12 +96,18 @@ def sweep(
     if auto and not table.limbs:
         table = limbed(table)
     _refuse_together({"--auto": auto, "--gait": gait, "--set gait": _sets(assignments or [], "gait")})
+    _refuse_together({"--perturb": perturb, "--set perturb": _sets(assignments or [], "perturb")})
     _refuse_together({"--seeds": seeds, "--runs": runs})
     _refuse_together({"--seeds": seeds, "--seed": seed})
     _refuse_together({"--jobs": jobs, "--cluster": cluster})
     axes = _axes(
         assignments or [],
-        {"gait": AUTO if auto else gait or default_gait(table.name), "engine": engine, "servo": servo},
+        {
+            "gait": AUTO if auto else gait or default_gait(table.name),
+            "engine": engine,
+            "servo": servo,
+            "perturb": " ".join(perturb) if perturb else AS_PLANNED,
+        },
     )
     campaign = _campaign(table, axes, _seeds(seeds, seed or 0, 1 if runs is None else runs))
     if jobs is not None and jobs < 1:
@@ -155,6 +170,12 @@ def _campaign(robot: Robot, axes: Axes, seeds: tuple[int, ...]) -> Campaign:
         engine_named(name)
     for name in axes["servo"]:
         SimulatedCompliance().on(name).motors_of(robot)
+    for text in axes["perturb"]:
+        check_world(text, robot)
+        if text != AS_PLANNED and "kinematic" in axes["engine"]:
+            raise InputError(
+                f"--perturb {text}: engine kinematic has no forces to perturb; use mujoco or pybullet"
+            )
     gaits = {name: json.dumps(_gait(robot, name).to_dict()) for name in axes["gait"]}
     campaign = Campaign(robot_text(robot), gaits, axes, seeds, versions(*TRACED))
     for values in campaign.settings:
@@ -178,6 +199,8 @@ def _workers(jobs: int, address: str | None) -> AbstractContextManager[Workers]:
 def _play(campaign: Campaign, rows: Journal, workers: Workers) -> None:
     """Play what has not ended yet."""
     left = [row for row in campaign.rows if row.index not in rows.outcomes]
+    if len(campaign.seeds) > 1 and AS_PLANNED in campaign.axes["perturb"]:
+        remark("remark: in the planned world the runs of a setting are all alike; --perturb x1 draws others")
     if rows.outcomes:
         remark(
             f"{len(rows.outcomes):,} of {len(campaign.rows):,} rows have ended before; {len(left):,} are left"
