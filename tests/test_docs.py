@@ -37,4 +37,6 @@ def test_the_first_commands_of_the_readme_each_stand_on_their_own(number: int, p
     assert make == f"{python} -m venv .venv"
     assert install.startswith(".venv/bin/pip install -")
     assert use
+    for line in use:  # uv would install into an environment that happens to be active
+        assert "uv pip" not in line or line.startswith(".venv/bin/uv pip install --python .venv ")
     assert all(one.startswith(".venv/bin/") for one in use)
