@@ -6,7 +6,6 @@ import os
 import tempfile
 from collections.abc import Iterator
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # before NumPy is loaded: pytest-xdist has the cores
@@ -14,23 +13,9 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
 os.environ.setdefault("SCREWKIN_CACHE", str(Path(tempfile.gettempdir()) / f"screwkin-tests-{os.getuid()}"))
 
+from tests.compilation import quick_xla_flags
 
-def _quick_compilation() -> str:
-    """XLA's flags for functions that are called a few times: half of their compilation is optimisation.
-
-    Values are those of the same operations in the same order, without fused multiplications. ``XLA_FLAGS= pytest …``
-    tests with the flags of everyday use. An unknown flag ends the process, so that which may go is tied to a version.
-    """
-    flags = ["--xla_backend_optimization_level=0", "--xla_llvm_disable_expensive_passes=true"]
-    try:
-        if version("jaxlib").startswith("0.10."):
-            flags.append("--xla_cpu_use_fusion_emitters=false")
-    except PackageNotFoundError:
-        return ""
-    return " ".join(flags)
-
-
-os.environ.setdefault("XLA_FLAGS", _quick_compilation())
+os.environ.setdefault("XLA_FLAGS", quick_xla_flags())
 
 import pytest
 from hypothesis import HealthCheck, settings

@@ -11,9 +11,10 @@ from typing import Any, cast
 
 from screwkin.errors import Fault, GaitError, InputError, near
 from screwkin.gait.footsteps import footholds
+from screwkin.gait.keys import CHOICES
 from screwkin.gait.lead import LEAD, SAME, side_by_side
 from screwkin.gait.places import HEIGHT, KEYS, StepEnd, read_places
-from screwkin.gait.record import CHOICES, Gait, Side, gait_from_dict
+from screwkin.gait.record import Gait, Side, gait_from_dict
 from screwkin.gait.stance import Stance
 from screwkin.model.toml import read_text
 

@@ -17,6 +17,7 @@ from screwkin.dynamics.terrain import STEEPEST
 from screwkin.errors import Fault, GaitError, near
 from screwkin.gait.free_path import read_free_waist
 from screwkin.gait.keypoints import CHANNELS, Channel, channel_faults, increases, read_channel
+from screwkin.gait.keys import CHOICES, KEYS, NUMBERS, OPTIONAL, TEXTS
 from screwkin.gait.places import StepEnd, read_places
 from screwkin.gait.relative import FREE, NOMINAL, read_lengths, relative_to_robot
 from screwkin.gait.settings import place, valid_keys
@@ -26,40 +27,6 @@ Kind = Literal["geometric", "preview", "footsteps"]
 Swing = Literal["cubic", "minimum-jerk"]
 Footholds = Literal["alternate", "close", "parallel"]
 Side = Literal["right", "left"]
-
-TEXTS = ("name", "description", "source")
-CHOICES: Mapping[str, tuple[str, ...]] = {
-    "kind": ("geometric", "preview", "footsteps"),
-    "swing": ("minimum-jerk", "cubic"),
-    "footholds": ("alternate", "close", "parallel"),
-    "com": ("true", "waist"),
-    "lateral": ("shift", "lean"),
-    "first": ("right", "left"),
-    "arms": ("follow", "rest"),
-}
-"""Parameters that choose; the first one is the default."""
-
-NUMBERS: Mapping[str, float | None] = {
-    "Tc": None,
-    "stride": None,
-    "side": 0.0,
-    "turn": 0.0,
-    "lift": None,
-    "waist_height": None,
-    "hand_drop": None,
-    "sway": 1.0,
-    "spread": 0.0,
-    "ramp": 1.0,
-    "steps": 8.0,
-    "rate": 50.0,
-}
-"""Parameters that are numbers, with their defaults; None: the file must say it."""
-
-OPTIONAL: Mapping[str, float] = {"uphill": 0.0, "upleft": 0.0, "roll": 0.0, "lead": 0.0}
-"""Further numbers, with their defaults; a gait records those only that are given."""
-
-FLAT = (*TEXTS, *CHOICES, *NUMBERS, *OPTIONAL)
-"""Every key of the table ``[gait]``."""
 
 _POSITIVE = ("Tc", "lift", "waist_height", "hand_drop", "rate")
 _TABLES = ("gait", "parameters", "channel", "waist", "lengths")
@@ -256,8 +223,8 @@ def _flat(table: Mapping[str, Any], faults: list[Fault]) -> dict[str, Any]:
     """The table ``[gait]`` with defaults filled in, texts and choices checked, numbers still as written."""
     row = "[gait]"
     for key in table:
-        if key not in FLAT:
-            fix = f"{near(key, FLAT)}Valid: {', '.join(FLAT)}; numbers of your own go to [parameters]"
+        if key not in KEYS:
+            fix = f"{near(key, KEYS)}Valid: {', '.join(KEYS)}; numbers of your own go to [parameters]"
             faults.append(Fault(row, key, "unknown key", fix))
     flat: dict[str, Any] = {}
     for key in TEXTS:
@@ -281,7 +248,7 @@ def _flat(table: Mapping[str, Any], faults: list[Fault]) -> dict[str, Any]:
 
 def _raw_numbers(flat: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
     return {key: flat[key] for key in (*NUMBERS, *OPTIONAL) if key in flat} | {
-        key: value for key, value in own.items() if key not in FLAT
+        key: value for key, value in own.items() if key not in KEYS
     }
 
 
@@ -302,7 +269,7 @@ def _numbers(
 ) -> dict[str, float | None]:
     """Values of all numeric parameters, and of the robot's lengths; None for a faulty one."""
     for key in own:
-        if key in FLAT:
+        if key in KEYS:
             found = f"{key!r} is a parameter of [gait]"
             faults.append(Fault("[parameters]", key, found, "Set it there, or choose another name"))
         elif key in NOMINAL:

@@ -9,8 +9,8 @@ import pytest
 
 import screwkin as sk
 from screwkin.errors import NoSolutionError
+from screwkin.gait.keys import NUMBERS
 from screwkin.gait.lengths import lengths_of
-from screwkin.gait.record import NUMBERS
 
 KEYS = "|".join(NUMBERS)
 

@@ -1,0 +1,95 @@
+"""Every key of a gait's table ``[gait]``: what it means, its unit and its default."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Key:
+    """A key: its meaning, unit, default (None: the file must say it), and the values of one that chooses."""
+
+    meaning: str
+    unit: str = ""
+    default: float | str | None = None
+    choices: tuple[str, ...] = ()
+
+    @property
+    def number(self) -> float | None:
+        """Its default as a number."""
+        return None if self.default is None else float(self.default)
+
+
+def _choice(meaning: str, *choices: str) -> Key:
+    """A key that chooses; the first choice is the default."""
+    return Key(meaning, default=choices[0], choices=choices)
+
+
+_TEXTS = {
+    "name": Key("name of the gait", default="the file's"),
+    "description": Key("one sentence", default=""),
+    "source": Key("where it comes from", default=""),
+}
+_CHOICES = {
+    "kind": _choice(
+        "what leads the waist: key points, preview control of the ZMP, or that over listed footholds",
+        "geometric",
+        "preview",
+        "footsteps",
+    ),
+    "swing": _choice("spline of a swing", "minimum-jerk", "cubic"),
+    "footholds": _choice(
+        "each foot passes the other, one leads and the other closes up, or both are side by side at the ends",
+        "alternate",
+        "close",
+        "parallel",
+    ),
+    "com": _choice(
+        "what preview control steers: the true CoM of all links, or the waist taken for it", "true", "waist"
+    ),
+    "lateral": _choice(
+        "whether the waist shifts to the side or leans between the hips, as legs without ankle roll need it",
+        "shift",
+        "lean",
+    ),
+    "first": _choice("foot that swings first", "right", "left"),
+    "arms": _choice("whether arms follow the path of their hands or rest at home", "follow", "rest"),
+}
+_NUMBERS = {
+    "Tc": Key("period of one step", "s"),
+    "stride": Key("displacement of a foot per swing, forward; negative walks backwards", "m"),
+    "side": Key("displacement of a foot per swing, to the left", "m", 0.0),
+    "turn": Key("turn of a foot per swing, to the left", "rad", 0.0),
+    "lift": Key("height of a swing", "m"),
+    "waist_height": Key("height of the waist above the floor", "m"),
+    "hand_drop": Key("how far hands hang below their shoulders", "m"),
+    "sway": Key("factor on the lateral motion of the waist", "", 1.0),
+    "spread": Key("added to each foot's distance from the middle", "m", 0.0),
+    "ramp": Key("steps over which the gait starts and stops; 0: at once", "steps", 1.0),
+    "steps": Key("how many steps, by default", "", 8.0),
+    "rate": Key("samples per second", "Hz", 50.0),
+}
+_OPTIONAL = {
+    "uphill": Key("angle by which the floor rises ahead, along x", "rad", 0.0),
+    "upleft": Key("angle by which the floor then rises to the left", "rad", 0.0),
+    "roll": Key(
+        "how far the ZMP goes from a sole's middle to where the other foot leaves, then to where it lands",
+        "share",
+        0.0,
+    ),
+    "lead": Key("time from home into the walk and out of it; 0 for none", "s", 0.0),
+}
+
+KEYS: Mapping[str, Key] = _TEXTS | _CHOICES | _NUMBERS | _OPTIONAL
+"""By name, in the order of a file."""
+
+TEXTS = tuple(_TEXTS)
+CHOICES: Mapping[str, tuple[str, ...]] = {name: key.choices for name, key in _CHOICES.items()}
+"""Parameters that choose; the first one is the default."""
+
+NUMBERS: Mapping[str, float | None] = {name: key.number for name, key in _NUMBERS.items()}
+"""Parameters that are numbers, with their defaults; None: the file must say it."""
+
+OPTIONAL: Mapping[str, float] = {name: key.number or 0.0 for name, key in _OPTIONAL.items()}
+"""Further numbers, with their defaults; a gait records those only that are given."""
