@@ -7,22 +7,28 @@ from pathlib import Path
 from typing import Any
 
 from screwkin.analysis.account import recorded_robot
-from screwkin.analysis.validate import planned_facts
+from screwkin.analysis.engines import simulated_on
+from screwkin.analysis.validate import allowed_for, planned_facts
 from screwkin.analysis.verdict import Criteria, Verdict, bound_to
 from screwkin.trajectory import load_trajectory
 
 
-def passing(path: Path, **changed: Any) -> Path:
+def passing(path: Path, servo: str = "rigid", **changed: Any) -> Path:
     """A verdict beside a trajectory that contradicts nothing but in what is changed; returns the path."""
-    (path.parent / "validation.json").write_text(json.dumps(passing_data(path) | changed), encoding="utf-8")
+    data = passing_data(path, servo) | changed
+    (path.parent / "validation.json").write_text(json.dumps(data), encoding="utf-8")
     return path
 
 
-def passing_data(path: Path) -> dict[str, Any]:
-    """The verdict of a run that went perfectly, as JSON data."""
+def passing_data(path: Path, servo: str = "rigid") -> dict[str, Any]:
+    """The verdict of a run on such servos that went perfectly, as JSON data."""
     trajectory = load_trajectory(path)
     robot = recorded_robot(trajectory)
     planned = planned_facts(robot, trajectory)
+    commands = simulated_on(servo).commands(robot, trajectory)
+    allowed = allowed_for(commands)
+    if commands is trajectory:
+        allowed["joint_stiffness"] = None
     return Verdict(
         passed=True,
         reasons=(),
@@ -32,7 +38,7 @@ def passing_data(path: Path) -> dict[str, Any]:
         engines={"pybullet": {"passed": True, "fell": False}},
         solver=None,
         undecided=False,
-        servo="rigid",
+        servo=servo,
         criteria=Criteria(),
         fell=False,
         fell_at=None,
@@ -50,11 +56,11 @@ def passing_data(path: Path) -> dict[str, Any]:
         max_tilt_deg=1.0,
         min_base_height=0.2,
         torque_use=dict.fromkeys(robot.joint_names, 0.5),
-        joint_stiffness=None,
         sole_stiffness=None,
         repeated=None,
         self_collisions=(),
         versions={},
         **planned,
-        **bound_to(robot, trajectory, "rigid"),
+        **allowed,
+        **bound_to(robot, trajectory, servo),
     ).to_dict()

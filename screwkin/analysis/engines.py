@@ -12,7 +12,7 @@ from screwkin.dynamics.terrain import FLAT, Terrain
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.gait.compensation import WAYS, compensate_walk, stiffness_of, way_of
 from screwkin.model.robot import Robot
-from screwkin.motors.library import motors_named, motors_of
+from screwkin.motors.library import motors_named, motors_of, names_motors
 from screwkin.motors.records import Motor
 from screwkin.sim.backend import Backend
 from screwkin.sim.compliant import STEP, Compliance, SpringServos
@@ -26,6 +26,8 @@ from screwkin.sim.pybullet import Physics, PyBulletBackend
 from screwkin.trajectory import Trajectory
 
 Engine = Literal["auto", "pybullet", "mujoco", "kinematic"]
+AUTO = "auto"
+"""The servos of the robot's table where commands can allow for them, else rigid ones."""
 RIGID = "rigid"
 """Servos that follow their commands exactly."""
 TABLE = "table"
@@ -87,10 +89,15 @@ class SimulatedCompliance:
     def commands(self, robot: Robot, trajectory: Trajectory) -> Trajectory:
         """What the servos are sent: on motors, a plan with the torque term, so that they follow it.
 
-        A trajectory that is compensated stays as it is, as does one that is no walk on two feet.
+        A trajectory that is compensated stays as it is, as does one that is no walk on two feet, or of a
+        robot whose loops share the torque. The same arguments give the same commands: whoever judges a plan
+        need not hand them on to whoever plays it.
+
+        Raises:
+            LimitError: a command is beyond a joint's limits. InputError: a motor's figures are not known.
         """
         motors = self.motors_of(robot)
-        if not motors or way_of(trajectory) != "none" or len(trajectory.feet) != 2:
+        if not motors or way_of(trajectory) != "none" or not _allows(robot, trajectory):
             return trajectory
         stiffness, damping, armature = (
             {name: float(getattr(m, what)) for name, m in zip(robot.joint_names, motors, strict=True)}
@@ -100,6 +107,35 @@ class SimulatedCompliance:
         return compensate_walk(
             robot, trajectory, stiffness, method, model=model, damping=damping, armature=armature
         )
+
+
+def servo_for(
+    servo: str | Path,
+    robot: Robot,
+    trajectory: Trajectory,
+    engine: Engine = "auto",
+    compliance: SimulatedCompliance | None = None,
+) -> str | Path:
+    """The servos that a name stands for; ``auto`` is ``table`` or ``rigid``.
+
+    It is ``table`` where the robot's table names the models of all servos, and commands can allow for them in
+    the trajectory. It is ``rigid`` besides springs, and where no forces are simulated.
+    """
+    if servo != AUTO:
+        return servo
+    chosen = compliance or SimulatedCompliance()
+    free = chosen.servos is None and chosen.motors is None and engine != "kinematic"
+    return TABLE if free and names_motors(robot) and _allows(robot, trajectory) else RIGID
+
+
+def simulated_on(servo: str) -> SimulatedCompliance:
+    """The servos that a verdict names: motors, or none where they were rigid or springs."""
+    return SimulatedCompliance().on(RIGID if servo == SpringServos.name else servo)
+
+
+def _allows(robot: Robot, trajectory: Trajectory) -> bool:
+    """Whether the torques that a walk asks of motors follow from it: two feet, and no loops in the robot."""
+    return len(trajectory.feet) == 2 and not robot.closures
 
 
 def confirms(engine: str) -> bool:

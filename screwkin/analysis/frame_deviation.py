@@ -18,9 +18,16 @@ _BETWEEN = 4
 """Times looked at between two frames, or two samples if they are closer."""
 
 
-def frame_deviation(robot: Robot, trajectory: Trajectory, bounds: Bounds, frames: Frames) -> float:
+def frame_deviation(
+    robot: Robot,
+    trajectory: Trajectory,
+    bounds: Bounds,
+    frames: Frames,
+    commands: Trajectory | None = None,
+) -> float:
     """Largest distance between where a limb is to be and where the frame nearest in time carries it [m].
 
+    Commands that allow for the servos are beside what is reached with them; what they allow for is taken off.
     A servo goes from goal to goal, so that it is half a frame ahead of its path and half a frame behind it at
     best. Goals are those that are written, rounded to ticks; distances are of tips and corners of soles, in
     the base's frame.
@@ -30,15 +37,18 @@ def frame_deviation(robot: Robot, trajectory: Trajectory, bounds: Bounds, frames
         trajectory: the validated path: between its samples the cubic through positions and rates.
         bounds: of the robot's servos: their ticks.
         frames: what is sent.
+        commands: of which they are the frames; by default of the trajectory.
     """
     finest = min(1.0 / frames.rate, float(np.diff(trajectory.time).min()))
     count = int(np.ceil(_BETWEEN * trajectory.duration / finest)) + 1
     time = np.linspace(0.0, trajectory.duration, count)
-    goals, planned = (
-        bounds.radians(bounds.ticks(frames.q)),
-        trajectory.sampled(trajectory.time[0] + frames.time),
-    )
-    goals = carried_by_motors(robot, bounds.names, goals, planned[0])
+    at = trajectory.time[0] + frames.time
+    planned = trajectory.sampled(at)[0]
+    goals = bounds.radians(bounds.ticks(frames.q))
+    if commands is not None and commands is not trajectory:
+        columns = [robot.joint_names.index(name) for name in bounds.names]
+        goals = goals - (commands.sampled(at)[0] - planned)[:, columns]
+    goals = carried_by_motors(robot, bounds.names, goals, planned)
     nearest = np.clip(np.rint(time * frames.rate).astype(int), 0, len(goals) - 1)
     path = trajectory.sampled(trajectory.time[0] + time)[0]
     away = _points(robot, goals)[nearest] - _points(robot, path)

@@ -16,8 +16,9 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.analysis.consistency import motion_faults
+from screwkin.analysis.engines import simulated_on
 from screwkin.analysis.frame_deviation import frame_deviation
-from screwkin.analysis.validate import planned_facts
+from screwkin.analysis.validate import allowed_for, planned_facts
 from screwkin.analysis.verdict import Criteria, Verdict, bound_to, contradictions, verdict_from_json
 from screwkin.errors import InputError, SafetyError, ScrewkinError, TrajectoryError, UnknownNameError
 from screwkin.files import LARGEST_TEXT, read_file, text_sha256
@@ -39,10 +40,13 @@ _SAME = 1e-6  # of numbers computed anew: what other versions' rounding may chan
 class Ready:
     """A trajectory that may be sent, its robot, the verdict that let it pass, and what will be sent.
 
-    deviation: of the frames from the validated path, see ``frame_deviation`` [m].
+    commands: what servos like the simulated ones are sent so that they follow the trajectory, itself on rigid
+    ones; frames: of the commands; deviation: of what is reached with them from the validated path, see
+    ``frame_deviation`` [m].
     """
 
     trajectory: Trajectory
+    commands: Trajectory
     robot: Robot
     verdict: Verdict
     servos: ServoMap
@@ -82,22 +86,41 @@ def ready(path: str | Path, robot: str | Path | None = None, settings: PlaySetti
     _refuse(path, f"is beyond the limits of {known.name}", limit_faults(known, trajectory))
     _refuse(path, "is not what was validated", _verdict_faults(known, trajectory, verdict))
     _refuse(path, "contradicts itself", _motion_faults(known, trajectory))
+    commands = _commanded(path, known, trajectory, verdict)
     how = settings or PlaySettings()
     servos = ServoMap.of(known)
     bounds = Bounds.of(known, servos, how.torque)
-    frames = frames_of(bounds, trajectory, how.rate)
-    away, allowed = frame_deviation(known, trajectory, bounds, frames), Criteria().frame_deviation
+    frames = frames_of(bounds, commands, how.rate)
+    away = frame_deviation(known, trajectory, bounds, frames, commands)
+    allowed = Criteria().frame_deviation
     if not away <= min(allowed, verdict.criteria.frame_deviation):
         raise SafetyError(
             f"{path}: at {how.rate:g} frames per second a limb is up to {1e3 * away:.1f} mm from the "
             f"validated path, allowed {1e3 * allowed:.1f} mm; raise --rate, or plan a slower walk"
         )
-    return Ready(trajectory, known, verdict, servos, bounds, frames, away)
+    return Ready(trajectory, commands, known, verdict, servos, bounds, frames, away)
 
 
 def _refuse(path: Path, what: str, faults: list[str]) -> None:
     if faults:
         raise SafetyError(f"{path} {what}: " + "; ".join(faults))
+
+
+def _commanded(path: Path, robot: Robot, trajectory: Trajectory, verdict: Verdict) -> Trajectory:
+    """The commands that the simulated servos were sent, computed anew.
+
+    Raises:
+        SafetyError: there are none, or they are not those that the verdict names.
+    """
+    try:
+        commands = simulated_on(verdict.servo).commands(robot, trajectory)
+    except ScrewkinError as error:
+        raise SafetyError(f"{path} has no commands for servos {verdict.servo}: {error}") from error
+    anew = allowed_for(commands)
+    if commands is trajectory:
+        del anew["joint_stiffness"]  # of springs, if of anything
+    _refuse(path, "is not what was validated", _differences(anew, verdict))
+    return commands
 
 
 def _verdict_faults(robot: Robot, trajectory: Trajectory, verdict: Verdict) -> list[str]:
@@ -107,19 +130,18 @@ def _verdict_faults(robot: Robot, trajectory: Trajectory, verdict: Verdict) -> l
             anew = planned_facts(robot, trajectory) | bound_to(robot, trajectory, verdict.servo)
     except ScrewkinError as error:
         return [str(error)]
-    faults = [
+    faults = _differences(anew, verdict)
+    if set(verdict.torque_use) != set(robot.joint_names):
+        faults.append(f"torque_use is not of the joints of {robot.name}")
+    return faults
+
+
+def _differences(anew: Mapping[str, Any], verdict: Verdict) -> list[str]:
+    return [
         f"{name} is {_short(value)}, the verdict says {_short(getattr(verdict, name))}"
         for name, value in anew.items()
         if not _same(value, getattr(verdict, name))
     ]
-    if anew["compensation"] == "none" and verdict.compensation != "none":
-        faults.append(
-            f"servos {verdict.servo} were simulated with commands that allow for them, which this file does "
-            "not hold: write those with screwkin walk --compensate dynamic, then validate and send that file"
-        )
-    if set(verdict.torque_use) != set(robot.joint_names):
-        faults.append(f"torque_use is not of the joints of {robot.name}")
-    return faults
 
 
 def _same(a: Any, b: Any) -> bool:

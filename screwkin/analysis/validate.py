@@ -12,7 +12,16 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.analysis.agreement import agreed, settled
 from screwkin.analysis.compliance import Conditions, StudyRow, Trial, repeated, summarised
-from screwkin.analysis.engines import RIGID, Engine, Refinement, SimulatedCompliance, engines_for, opened
+from screwkin.analysis.engines import (
+    AUTO,
+    RIGID,
+    Engine,
+    Refinement,
+    SimulatedCompliance,
+    engines_for,
+    opened,
+    servo_for,
+)
 from screwkin.analysis.verdict import Criteria, Measured, fallen_again, reasons_of
 from screwkin.errors import InputError
 from screwkin.files import text_sha256
@@ -39,10 +48,6 @@ _FINER = {
     "half the step": Refinement(step=2),
     "twice the iterations": Refinement(iterations=2),
 }
-_NOT_THE_FILE = (
-    "the servos were sent commands that allow for them, which the file does not hold, so send refuses it; to "
-    "send, write the commands with walk --compensate dynamic and validate those"
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +65,7 @@ def validate(
     trajectory: Trajectory,
     engine: Engine = "auto",
     *,
-    servo: str | Path = RIGID,
+    servo: str | Path = AUTO,
     gui: bool = False,
     camera: Camera | None = None,
     criteria: Criteria | None = None,
@@ -77,8 +82,10 @@ def validate(
         trajectory: what to play.
         engine: ``pybullet`` or ``mujoco`` (bodies, motors, contacts); ``auto``, all of them that are
             installed, which must agree; or ``kinematic`` (perfect tracking; never passes).
-        servo: ``rigid`` (commands are followed exactly), ``table`` (motors of the models that the robot's
-            table names), or the name or the file of a servo model, for all joints.
+        servo: ``table`` (motors of the models that the robot's table names, sent commands that allow for
+            their torque, as ``send`` does), ``rigid`` (commands are followed exactly), the name or the file
+            of a servo model, for all joints; or ``auto``: ``table`` where the table names all models and the
+            trajectory is a walk on two feet, else ``rigid``.
         gui: show a window, in real time.
         camera: take its pictures of what happens; they need neither display nor simulator.
         criteria: what a walk must satisfy.
@@ -107,7 +114,10 @@ def validate(
     """
     _check_fit(robot, trajectory)
     rule, report = criteria or Criteria(), progress or (lambda share: None)
-    compliance = (compliance or SimulatedCompliance()).on(servo).for_trajectory(robot, trajectory)
+    wanted = compliance or SimulatedCompliance()
+    by_itself = AUTO if motion is None else RIGID
+    on = servo_for(by_itself if servo == AUTO else servo, robot, trajectory, engine, wanted)
+    compliance = wanted.on(on).for_trajectory(robot, trajectory)
     commands = motion or compliance.commands(robot, trajectory)
     start = (motion or intended(robot, trajectory)).q[0]
     names, terrain = engines_for(engine, robot, compliance), ground_of(trajectory)
@@ -134,12 +144,7 @@ def validate(
         check = judged(robot, trajectory, run, rule, compliance)
         if commands is trajectory or motion is not None:
             return check
-        return replace(
-            check,
-            compensation=way_of(commands),
-            joint_stiffness=_stiffness(commands),
-            warnings=(*check.warnings, _NOT_THE_FILE),
-        )
+        return replace(check, **allowed_for(commands))
 
     checks = []
     for name in names:
@@ -159,10 +164,11 @@ def validate(
     return _repeated(check, repeated(robot, trajectory, compliance.servos.stiffness, conditions, later))
 
 
-def _stiffness(commands: Trajectory) -> dict[str, float] | None:
-    """What the commands of motors allow for [N m/rad]."""
+def allowed_for(commands: Trajectory) -> dict[str, Any]:
+    """The fields of a verdict that say how commands for motors allow for them, and for what stiffness."""
     allowed = stiffness_of(commands)
-    return {**allowed} if isinstance(allowed, Mapping) else None
+    stiffness = {**allowed} if isinstance(allowed, Mapping) else None
+    return {"compensation": way_of(commands), "joint_stiffness": stiffness}
 
 
 def _repeated(check: Validation, trials: Sequence[Trial]) -> Validation:
@@ -230,6 +236,7 @@ def judged(
         min_base_height=float(run.T_world_base[:, 2, 3].min()),
         torque_use=dict(zip(robot.joint_names, torque.tolist(), strict=True)),
         **planned_facts(robot, trajectory),
+        compensation=way_of(trajectory),
         joint_stiffness=dict(springs) if isinstance(springs, Mapping) else None,
         sole_stiffness=compliance.sole_stiffness,
         repeated=None,
@@ -255,7 +262,6 @@ def planned_facts(robot: Robot, trajectory: Trajectory) -> dict[str, Any]:
         "speed_use": dict(zip(robot.joint_names, speed.tolist(), strict=True)),
         "trajectory_sha256": trajectory.sha256,
         "robot_sha256": text_sha256(robot_text(robot)),
-        "compensation": way_of(trajectory),
     }
 
 

@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from screwkin.analysis.engines import PROVING, SimulatedCompliance, confirms
+from screwkin.analysis.engines import PROVING, confirms, simulated_on
 from screwkin.errors import InputError, ScrewkinError
 from screwkin.files import read_json, versions
 from screwkin.model.robot import Robot
 from screwkin.motors.library import motors_sha256
 from screwkin.servo.servo_map import ServoMap
-from screwkin.sim.compliant import SpringServos
 from screwkin.sim.measure import WINDOW
 from screwkin.sim.run import Schedule
 from screwkin.sim.self_collision import SelfCollision
@@ -144,7 +143,7 @@ def bound_to(robot: Robot, trajectory: Trajectory, servo: str) -> dict[str, Any]
         InputError, UnknownNameError, TableError: servos of that name are motors without figures, or faulty.
     """
     time = trajectory.time
-    motors = () if servo == SpringServos.name else SimulatedCompliance().on(servo).motors_of(robot)
+    motors = simulated_on(servo).motors_of(robot)
     return {
         "servo_map_sha256": servo_map_sha256(robot),
         "motors_sha256": motors_sha256(motors) if motors else "",

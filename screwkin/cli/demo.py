@@ -171,8 +171,8 @@ def _played_to_virtual(trajectory: Path, robot: str, log: Path) -> dict[str, Any
         return _nothing("The robot's table has no [servos]: nothing to play to.")
     try:
         may = ready(trajectory, robot)
-        bus, guard = virtual_bus(may.robot)
-        outcome = played(bus, may, PlaySettings(), log, {"port": "virtual"}, guard)
+        bus, guard, follow = virtual_bus(may)
+        outcome = played(bus, may, PlaySettings(), log, {"port": "virtual"}, guard, follow)
     except SafetyError as error:
         return _nothing(f"Refused: {error}")
     assert isinstance(bus.line, VirtualBus)

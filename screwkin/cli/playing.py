@@ -47,6 +47,7 @@ def played(
     log: Path,
     facts: Mapping[str, Any],
     guard: Guard | None = None,
+    follow: Callable[[float], None] = lambda share: None,
 ) -> PlayOutcome:
     """Play on a bus, close it, and leave a log whatever happens once the servos move.
 
@@ -57,6 +58,7 @@ def played(
         log: path of its npz file; beside it stands the journal while it plays, and where that fails.
         facts: what its ``meta`` holds besides.
         guard: of the servos; by default nobody.
+        follow: called at every frame of the trajectory with the share of it that was played.
 
     Raises:
         OutputError: no log can be written; nothing has moved.
@@ -74,11 +76,16 @@ def played(
             expected = len(may.frames.q) + math.ceil(_BESIDE * settings.rate)
             check_room(journal.parent, expected, len(may.bounds.ids))
             with progress_bar("playing") as done, _appended(journal) as file:
+
+                def progress(share: float) -> None:
+                    follow(share)
+                    done(share)
+
                 opened = True
                 record = Log(may.bounds.names, may.bounds.ids, file, meta)
-                player = Player(bus, may.robot, settings, stopped, done, record, guard)
+                player = Player(bus, may.robot, settings, stopped, progress, record, guard)
                 try:
-                    outcome = player.play(may.trajectory)
+                    outcome = player.play(may.commands)
                 finally:
                     frames = record.frames
                 meta |= outcome.to_dict()

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from screwkin.analysis.readiness import ready
+from screwkin.analysis.engines import simulated_on
+from screwkin.analysis.readiness import Ready, ready
 from screwkin.cli.folder import output_folder
 from screwkin.cli.injected import Faults, FormerFaults, Seed, injected_faults
 from screwkin.cli.options import AsJson, OutputFolder, TrajectoryPath
 from screwkin.cli.output import print_json, remark
 from screwkin.cli.playing import log_of, played, played_on_port
 from screwkin.errors import InputError, UnknownNameError
-from screwkin.model.robot import Robot
+from screwkin.gait.compensation import way_of
+from screwkin.gait.feed_forward import walking_torques
+from screwkin.gait.intended import intended
 from screwkin.servo.budget import ADAPTER, budget
 from screwkin.servo.bus import Bus
 from screwkin.servo.frames import Frames
@@ -26,6 +29,7 @@ from screwkin.servo.player import PlayOutcome, PlaySettings, describe
 from screwkin.servo.servo_map import ServoMap
 from screwkin.servo.virtual.bus import SimulatedClock, VirtualBus
 from screwkin.servo.virtual.faults import InjectedFault
+from screwkin.servo.virtual.load import PlannedLoad
 from screwkin.servo.virtual.robot import virtual_servos
 from screwkin.servo.watch import Thresholds
 
@@ -101,19 +105,37 @@ def send(
             place = Place(port, servos.baud, rs485, servos.protocol)
             outcome = played_on_port(may, settings, log, place)
         else:
-            bus, guard = virtual_bus(may.robot, faults, seed)
-            outcome = played(bus, may, settings, log, {"port": "virtual"}, guard)
+            bus, guard, follow = virtual_bus(may, faults, seed)
+            outcome = played(bus, may, settings, log, {"port": "virtual"}, guard, follow)
         facts["log"] = str(log_of(log))
     return _print_outcome(outcome, facts, bounds, as_json)
 
 
-def virtual_bus(robot: Robot, faults: Sequence[InjectedFault] = (), seed: int = 0) -> tuple[Bus, OwnGuard]:
-    """Virtual servos of the robot in its posture ``home``, or at zero, in simulated time; and their guard."""
-    servos, clock = ServoMap.of(robot), SimulatedClock()
-    mounted = virtual_servos(robot, return_delay=_RETURN_DELAY)
+def virtual_bus(
+    may: Ready, faults: Sequence[InjectedFault] = (), seed: int = 0
+) -> tuple[Bus, OwnGuard, Callable[[float], None]]:
+    """Virtual servos in simulated time, their guard, and what must be called with the share that was played.
+
+    They stand in the robot's posture ``home``, or at zero. Where the verdict rests on motors, each is as
+    stiff as its motor, and loaded by what the plan asks of it.
+    """
+    robot, clock = may.robot, SimulatedClock()
+    servos, motors = ServoMap.of(robot), simulated_on(may.verdict.servo).motors_of(robot)
+    stiffness = {name: float(m.stiffness) for name, m in zip(robot.joint_names, motors, strict=False)}
+    mounted = virtual_servos(robot, stiffness=stiffness or None, return_delay=_RETURN_DELAY)
+    follow: Callable[[float], None] = _unloaded
+    if way_of(may.commands) != "none":
+        plan = intended(robot, may.trajectory)
+        load = PlannedLoad(plan.time, walking_torques(robot, plan), robot.joint_names, clock.now)
+        load.put_on(mounted, servos)
+        follow = load.follow
     line = VirtualBus(mounted, clock, servos.baud, faults, seed, adapter=ADAPTER)
     bus = Bus(line, servos.protocol, servos.baud, clock)
-    return bus, OwnGuard(bus, line.reopened)
+    return bus, OwnGuard(bus, line.reopened), follow
+
+
+def _unloaded(share: float) -> None:
+    """Servos that no load turns need not know how far the plan is."""
 
 
 def _print_dry(path: Path, frames: Frames, bounds: Bounds, facts: dict[str, Any], as_json: bool) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from screwkin.analysis.account import Account
-from screwkin.analysis.engines import ENGINES, Engine, SimulatedCompliance
+from screwkin.analysis.engines import AUTO, ENGINES, Engine, SimulatedCompliance
 from screwkin.analysis.validate import Validation
 from screwkin.analysis.validate import validate as validated
 from screwkin.analysis.verdict import Criteria, verdict_of
@@ -31,7 +31,7 @@ FEWEST, MOST = 30, 120
 class Wish:
     """What a simulation is to be: engine, a window, a film, pictures and page; commands for the page.
 
-    check_solver, compliance, perturbation: see ``validate``. motion: what the joints do instead of the
+    check_solver, servo, compliance, perturbation: see ``validate``. motion: what the joints do instead of the
     trajectory; criteria: what a walk must satisfy; more: what follows once the verdict is written; it returns
     what draws more pictures.
     """
@@ -44,6 +44,7 @@ class Wish:
     commands: Sequence[str] = ()
     compliance: SimulatedCompliance = field(default_factory=SimulatedCompliance)
     perturbation: Perturbation = NONE
+    servo: str = AUTO
     motion: Trajectory | None = None
     criteria: Criteria | None = None
     more: Callable[[Validation], Callable[[], Sequence[Saved]]] = lambda check: tuple
@@ -69,6 +70,7 @@ def simulate_to_files(account: Account, folder: Path, verdict: Path, wish: Wish)
             account.robot,
             trajectory,
             engine(wish.engine),
+            servo=wish.servo,
             gui=wish.gui,
             camera=camera,
             criteria=wish.criteria,

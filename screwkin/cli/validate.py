@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from screwkin.analysis.account import account_of, recorded_robot
-from screwkin.analysis.engines import RIGID, SimulatedCompliance
+from screwkin.analysis.engines import AUTO, SimulatedCompliance, servo_for
 from screwkin.analysis.verdict import verdict_of
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, Perturbed, TrajectoryPath, perturbation_of
@@ -39,9 +39,10 @@ def validate(
     servo: Annotated[
         str,
         typer.Option(
-            help="rigid; table: motors of the models that the table names; or a servo model, or its file."
+            help="table: motors of the models that the table names; rigid; a servo model, or its file; or "
+            "auto: table where the table names models and the commands can allow for them, else rigid."
         ),
-    ] = RIGID,
+    ] = AUTO,
     compliant: Annotated[
         bool, typer.Option("--compliant", help="Springs for servos, commanded at the trajectory's rate.")
     ] = False,
@@ -82,7 +83,7 @@ def validate(
     engine_named(engine)
     compliance = _compliance(compliant, k, sole_stiffness, repeat, servo)
     if log is not None:
-        if compliance != SimulatedCompliance() or perturb:
+        if compliance != SimulatedCompliance() or servo != AUTO or perturb:
             raise InputError(
                 "--log replays servos that moved; it goes without --servo, --compliant, --sole-stiffness and "
                 "--perturb"
@@ -91,19 +92,20 @@ def validate(
     by = perturbation_of(perturb or [])
     loaded = load_trajectory(trajectory)
     account = account_of(recorded_robot(loaded, str(trajectory)), loaded)
-    compliance.for_trajectory(account.robot, loaded)  # refused before anything is written
+    chosen = servo_for(servo, account.robot, loaded, engine_named(engine), compliance)
+    compliance.on(chosen).for_trajectory(account.robot, loaded)  # refused before anything is written
     beside = _beside(trajectory)
     words = [
         "screwkin",
         "validate",
         str(trajectory),
-        *_changes(engine, compliance, k),
+        *_changes(engine, servo, compliance, k),
         *(["--check-solver"] * check_solver),
         *(word for text in described(by) for word in ("--perturb", text)),
         *(["--video"] * video),
     ]
     commands = _commands(str(loaded.meta.get("command", "")), words)
-    wish = Wish(engine, check_solver, gui, video, plots, commands, compliance, by)
+    wish = Wish(engine, check_solver, gui, video, plots, commands, compliance, by, servo)
     with output_folder(output or beside, "validate", account.robot.name) as folder:
         check = simulate_to_files(account, folder, beside / "validation.json", wish)
     if as_json:
@@ -134,16 +136,16 @@ def _compliance(
     if not compliant and (repeat or k is not None):
         option, instead = (
             "--repeat" if repeat else "--stiffness",
-            "" if servo == RIGID else " instead of --servo",
+            "" if servo == AUTO else " instead of --servo",
         )
         raise InputError(f"{option} is of elastic servos; add --compliant{instead}")
-    return SimulatedCompliance(Compliance(k) if compliant else None, sole_stiffness, repeat).on(servo)
+    return SimulatedCompliance(Compliance(k) if compliant else None, sole_stiffness, repeat)
 
 
-def _changes(engine: str, compliance: SimulatedCompliance, k: float | None) -> list[str]:
+def _changes(engine: str, servo: str, compliance: SimulatedCompliance, k: float | None) -> list[str]:
     """The options that ask for another simulation than the usual one."""
     words = ["--engine", engine] if engine != "auto" else []
-    words += ["--servo", compliance.motors] if compliance.motors is not None else []
+    words += ["--servo", servo] if servo != AUTO else []
     words += ["--compliant"] if compliance.servos is not None else []
     words += [] if k is None else ["--stiffness", f"{k:g}"]
     words += (

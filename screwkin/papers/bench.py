@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from screwkin.analysis.account import Account, account_of
 from screwkin.analysis.compare import Comparison, compare_models
-from screwkin.analysis.engines import SimulatedCompliance
+from screwkin.analysis.engines import RIGID, SimulatedCompliance
 from screwkin.analysis.facts import Facts, facts_of
 from screwkin.analysis.validate import Validation, validate
 from screwkin.gait.files import load_gait
@@ -61,7 +61,9 @@ class Bench:
         """The verdict of the simulator on a walk, with rigid soles or elastic ones [N/m]."""
         trajectory, compliance = account.trajectory, SimulatedCompliance(sole_stiffness=sole_stiffness)
         key = ("validation", trajectory.sha256, sole_stiffness)
-        return self.once(key, lambda: validate(account.robot, trajectory, "pybullet", compliance=compliance))
+        return self.once(
+            key, lambda: validate(account.robot, trajectory, "pybullet", servo=RIGID, compliance=compliance)
+        )
 
     def verdicts(self, account: Account, sole_stiffness: float | None = None) -> tuple[dict[str, Any], ...]:
         """The verdicts of runs of a walk that differ by rounding; the first is that of ``validation``."""
@@ -71,7 +73,9 @@ class Bench:
             if not run:
                 return self.validation(account, sole_stiffness).to_dict()
             trajectory = shaken(account.trajectory, run)
-            return validate(account.robot, trajectory, "pybullet", compliance=compliance).to_dict()
+            return validate(
+                account.robot, trajectory, "pybullet", servo=RIGID, compliance=compliance
+            ).to_dict()
 
         key = ("verdicts", account.trajectory.sha256, sole_stiffness)
         return self.once(

@@ -96,7 +96,8 @@ class Player:
         robot: whose limits hold.
         settings: how to play.
         stop: asked in every frame whether to come to rest early.
-        progress: called with the share of the trajectory that was played.
+        progress: called when a frame of the trajectory is due with the share of its time that was played,
+            from 0 to 1.
         log: of the robot's joints; by default in memory.
         guard: who takes over where the player cannot go on; nobody for servos that end with this process.
     """
@@ -234,6 +235,8 @@ class Player:
         for i, goal in enumerate(q):
             if (wait := self._due - clock.now()) > 0:
                 clock.sleep(wait)
+            if times is not None:
+                self._progress(float(times[i] / times[-1]))
             if not self._resting and (kind := self._reason_to_stop()) is not None:
                 self._come_to_rest(q, i, *kind)
             late = clock.now() - self._due
@@ -250,8 +253,6 @@ class Player:
             self._due += period
             self._read(goal)
             self.log.flush(self._time())
-            if times is not None:
-                self._progress((i + 1) / len(q))
 
     def _reason_to_stop(self) -> tuple[FaultKind, str] | None:
         """Why the play should end in order, if it should."""

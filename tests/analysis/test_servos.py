@@ -7,16 +7,21 @@ import numpy as np
 import pytest
 
 import screwkin as sk
-from screwkin.analysis.engines import Refinement, SimulatedCompliance, opened
+from screwkin.analysis.engines import Refinement, SimulatedCompliance, opened, servo_for
 from screwkin.analysis.readiness import ready
+from screwkin.analysis.replay import replayed
 from screwkin.analysis.validate import planned_facts
 from screwkin.analysis.verdict import bound_to, verdict_of
+from screwkin.cli.playing import played
+from screwkin.cli.send import virtual_bus
 from screwkin.compliance.springs import joint_stiffness
 from screwkin.errors import InputError, SafetyError, UnknownNameError
 from screwkin.gait.compensation import compensate_walk, stiffness_of, way_of
 from screwkin.motors.library import load_motor, motor_text
+from screwkin.servo.log import load_log
+from screwkin.servo.player import PlaySettings
 from screwkin.sim.compliant import Compliance
-from tests.verdicts import passing
+from tests.verdicts import passing, passing_data
 
 ROBOT = sk.load_robot("bioloid")
 TABLE = SimulatedCompliance(motors="table")
@@ -34,13 +39,63 @@ def verdict(fast):
     return sk.validate(ROBOT, fast, "mujoco", servo="table")
 
 
-def test_the_torque_term_on_a_plan_is_a_warning_and_send_refuses_such_a_verdict(verdict, fast, tmp_path):
-    """What send would play is the plan; only the file with the commands is what was validated."""
-    assert any("--compensate dynamic" in warning for warning in verdict.warnings)
-    path = passing(fast.save(tmp_path / "trajectory.npz"), servo="table", compensation=verdict.compensation)
-    with pytest.raises(SafetyError, match="compensation is none, the verdict says dynamic") as refused:
+def test_send_plays_the_commands_that_the_simulated_servos_were_sent(verdict, fast, tmp_path):
+    path = fast.save(tmp_path / "trajectory.npz")
+    data = verdict_of(ROBOT, fast, verdict).to_dict()
+    (tmp_path / "validation.json").write_text(json.dumps(data), encoding="utf-8")
+    may = ready(path)
+    assert np.array_equal(may.commands.q, TABLE.commands(ROBOT, fast).q)
+    assert np.array_equal(may.frames.q, may.commands.sampled(may.commands.time[0] + may.frames.time)[0])
+    assert np.abs(may.commands.q - fast.q).max() > 0.01, "commands that are seen to allow for torques"
+    assert may.deviation == pytest.approx(ready(passing(path)).deviation, rel=0.2), "of what is reached"
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"compensation": "none"},
+        {"joint_stiffness": None},
+        {"joint_stiffness": dict.fromkeys(ROBOT.joint_names, 60.0)},
+        {"servo": "rigid"},
+        {"servo": "MX-28"},
+        {"servo": "springs"},
+    ],
+    ids=str,
+)
+def test_commands_other_than_the_verdicts_are_refused(fast, tmp_path, changed):
+    path = passing(fast.save(tmp_path / "trajectory.npz"), **{"servo": "table", **changed})
+    if "servo" in changed:  # a verdict on the table's servos, whose name of them is another one
+        data = passing_data(path, "table") | changed
+        (tmp_path / "validation.json").write_text(json.dumps(data), encoding="utf-8")
+    with pytest.raises(SafetyError, match="is not what was validated"):
         ready(path)
-    assert "write those with screwkin walk --compensate dynamic" in str(refused.value)
+
+
+def test_without_a_word_servos_are_the_tables_where_commands_can_allow_for_them(fast):
+    assert servo_for("auto", ROBOT, fast) == "table"
+    assert servo_for("rigid", ROBOT, fast) == "rigid"
+    assert servo_for("auto", ROBOT, fast, "kinematic") == "rigid"
+    assert servo_for("auto", ROBOT, fast, compliance=SimulatedCompliance(Compliance(60.0))) == "rigid"
+    assert servo_for("auto", replace(ROBOT, servos={}), fast) == "rigid"
+    looped = sk.load_robot("linkages/knee-parallelogram")
+    assert servo_for("auto", looped, fast) == "rigid", "loops share torques"
+    assert servo_for("auto", ROBOT, replace(fast, feet=fast.feet[:1], contact=fast.contact[:, :1])) == "rigid"
+
+
+def test_virtual_servos_that_are_loaded_by_the_plan_stand_where_it_is(tmp_path):
+    """Each bends under its torque, and commands undo it: what is left is lag in motion, a tick at rest."""
+    walk = sk.walk(ROBOT, sk.load_gait("smooth"), steps=1)
+    may = ready(passing(walk.save(tmp_path / "trajectory.npz"), servo="table"))
+    bus, guard, follow = virtual_bus(may)
+    played(bus, may, PlaySettings(), tmp_path / "play.npz", {}, guard, follow)
+    log = load_log(tmp_path / "play.npz")
+    planned, motion = replayed(ROBOT, walk, log)
+    off, late = np.abs(motion.q - planned.q).max(axis=0), 0.04 * np.abs(planned.qd).max(axis=0)
+    assert (off < late + 0.006).all()
+    at_rest = log.time > log.time[np.isfinite(log.trajectory_time)][-1] + 0.25
+    stood = np.nanmean(log.position[at_rest], axis=0)
+    assert np.abs(stood - walk.q[-1]).max() < 0.006
+    assert np.abs(may.commands.q[-1] - walk.q[-1]).max() > 0.01, "seen in the readings, were it not undone"
 
 
 def test_a_servo_file_that_changed_since_is_refused(verdict, fast, tmp_path):
@@ -49,7 +104,9 @@ def test_a_servo_file_that_changed_since_is_refused(verdict, fast, tmp_path):
     file.write_text(motor_text(load_motor("AX-12A")), encoding="utf-8")
     commands = compensate_walk(ROBOT, fast, model="dynamic")
     own = replace(verdict, servo=str(file))
-    data = verdict_of(ROBOT, commands, replace(own, **planned_facts(ROBOT, commands), warnings=())).to_dict()
+    data = verdict_of(
+        ROBOT, commands, replace(own, **planned_facts(ROBOT, commands), compensation="dynamic")
+    ).to_dict()
     path = commands.save(tmp_path / "trajectory.npz")
     (tmp_path / "validation.json").write_text(json.dumps(data), encoding="utf-8")
     assert len(ready(path).verdict.motors_sha256) == 64

@@ -68,7 +68,7 @@ def pressing(robot: Robot, run: Run, walk: Trajectory) -> Run:
 @pytest.fixture(scope="module")
 def check(robot: Robot, walk: Trajectory) -> Validation:
     pytest.importorskip("pybullet")
-    return validate(robot, walk, camera=Camera(pictures=3, width=80, height=60))
+    return validate(robot, walk, servo="rigid", camera=Camera(pictures=3, width=80, height=60))
 
 
 def test_a_walk_passes_and_contacts_agree_with_the_plan(check: Validation) -> None:
@@ -124,7 +124,7 @@ def test_servos_that_would_have_to_be_faster_are_a_warning_and_no_reason(check: 
 
 def test_a_hurried_walk_falls_with_all_its_reasons(robot: Robot) -> None:
     pytest.importorskip("mujoco")
-    check = validate(robot, planned(robot, steps=4, Tc=0.5), engine="mujoco")
+    check = validate(robot, planned(robot, steps=4, Tc=0.5), engine="mujoco", servo="rigid")
     assert not check.passed
     assert check.fell
     assert check.fell_at is not None
@@ -137,7 +137,7 @@ def test_a_hurried_walk_falls_with_all_its_reasons(robot: Robot) -> None:
 def test_weak_servos_do_not_carry_the_robot(robot: Robot, walk: Trajectory) -> None:
     pytest.importorskip("mujoco")
     weak = replace(robot, joints=tuple(replace(joint, effort=0.3) for joint in robot.joints))
-    check = validate(weak, walk, engine="mujoco")
+    check = validate(weak, walk, engine="mujoco", servo="rigid")
     assert check.fell
     assert any("torque at the servo's limit for 50 ms" in reason for reason in check.reasons)
 
@@ -266,7 +266,7 @@ def test_unknown_engines_and_foreign_trajectories_are_refused(robot: Robot, walk
 @pytest.mark.slow
 @pytest.mark.parametrize("Tc", [0.8, 1.0, 1.5, 2.0])
 def test_eight_steps_pass_at_every_pace(robot: Robot, Tc: float) -> None:
-    check = validate(robot, planned(robot, steps=8, Tc=Tc))
+    check = validate(robot, planned(robot, steps=8, Tc=Tc), servo="rigid")
     assert check.passed
     assert check.end_error_mm < 2.0
     assert check.zmp_rms_mm is not None
@@ -280,7 +280,7 @@ def test_eight_steps_pass_at_every_pace(robot: Robot, Tc: float) -> None:
     ("gait", "settings"), [("walk", {"Tc": 0.5}), ("paper", {"Tc": 0.5}), ("walk", {"sway": 0.0})]
 )
 def test_what_cannot_balance_falls(robot: Robot, gait: str, settings: dict[str, float]) -> None:
-    check = validate(robot, sk.walk(robot, sk.load_gait(gait).replace(**settings), steps=8))
+    check = validate(robot, sk.walk(robot, sk.load_gait(gait).replace(**settings), steps=8), servo="rigid")
     assert check.fell
     assert not check.passed
 

@@ -76,7 +76,7 @@ def test_a_walk_too_fast_for_the_servos_is_shown_but_not_sent(cli, without_pictu
 
     text = find_gait("walk").read_text(encoding="utf-8")
     gait = tmp_path / "hasty.toml"
-    gait.write_text(text.replace("Tc = 1.5", "Tc = 0.8"), encoding="utf-8")
+    gait.write_text(text.replace("Tc = 1.5", "Tc = 1.0"), encoding="utf-8")
     called = cli("demo", "--gait", gait, "--steps", 1, "-o", "out")
     assert called.code == 0
     assert "Refused: " in called.out

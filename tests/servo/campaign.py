@@ -182,7 +182,7 @@ def prepare(folder: Path, simulated: bool = True, model: str = "AX-12A") -> floa
     path = folder / "trajectory.npz"
     _well("walk", table, "--gait", "smooth", "--steps", 1, "--no-plots", "-o", folder, "--json")
     if simulated:
-        _well("validate", path, "--no-plots", "--json")
+        _well("validate", path, "--servo", "rigid", "--no-plots", "--json")
     else:
         passing(path)
     return 1.0 + load_trajectory(path).duration + 0.5

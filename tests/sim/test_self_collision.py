@@ -132,7 +132,7 @@ def test_a_walk_whose_forearms_meet_fails_with_names_depth_and_time():
     q = walk.q.copy()
     q[:, robot.joint_names.index("right_shoulder_roll")] += inwards
     bent = replace(walk, q=q)
-    check = sk.validate(robot, bent, "mujoco")
+    check = sk.validate(robot, bent, "mujoco", servo="rigid")
     (first, *_) = check.self_collisions
     assert set(first.links) & {"right_forearm", "right_upper_arm"}
     assert not check.passed

@@ -7,6 +7,7 @@ spring. All of it is in closed form, so that it does not matter how often one lo
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 VOLTAGE, OVERHEAT, OVERLOAD = 0x01, 0x04, 0x20
@@ -40,9 +41,9 @@ class Body:
     """Angles from the servo's centre [rad], torques [N m], times [s], temperatures [degrees Celsius].
 
     ``stiffness`` [N m/rad] is that of the joint; ``load`` is what the world turns the output with, positive
-    towards greater ticks. ``lag`` is the time constant of the motion. A load beyond the torque limit is an
-    overload once it has lasted for ``patience``. ``sag`` [V] is what the current of all servos takes of the
-    supply.
+    towards greater ticks, to which ``planned`` adds what ``load_at`` says of the body's time. ``lag`` is the
+    time constant of the motion. A load beyond the torque limit is an overload once it has lasted for
+    ``patience``. ``sag`` [V] is what the current of all servos takes of the supply.
     """
 
     stall_torque: float
@@ -50,6 +51,8 @@ class Body:
     angle: float = 0.0
     stiffness: float = math.inf
     load: float = 0.0
+    load_at: Callable[[float], float] | None = None
+    planned: float = 0.0
     lag: float = 0.025
     patience: float = 0.5
     temperature: float = 30.0
@@ -66,14 +69,19 @@ class Body:
         return self.voltage - self.sag
 
     @property
+    def turned_with(self) -> float:
+        """What the world turns the output with, all together [N m]."""
+        return self.load + self.planned
+
+    @property
     def output(self) -> float:
         """The angle of the output: the motor's, and the deflection of the spring."""
-        return self.angle + self.load / self.stiffness
+        return self.angle + self.turned_with / self.stiffness
 
     @property
     def effort(self) -> float:
         """The torque that holds against the load, as a share of the stall torque."""
-        return -self.load / self.stall_torque
+        return -self.turned_with / self.stall_torque
 
     def advance(self, time: float, drive: Drive, torque: float) -> None:
         """Go on to a time with a drive and a torque limit [share of the stall torque]."""
@@ -81,6 +89,8 @@ class Body:
         if dt <= 0:
             return
         self.time = time
+        if self.load_at is not None:
+            self.planned = self.load_at(time)
         if drive is None:
             self.rate, heat, strained = 0.0, 0.0, False
         else:

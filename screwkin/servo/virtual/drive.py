@@ -33,10 +33,10 @@ def drive_of(profile: Profile, mode: Mode, frame: CountingFrame, get: Get, body:
         rate = get(name) * profile.speed_unit
         return AtRate(way * math.copysign(_limited(profile, get, abs(rate), most), rate))
     if mode == "current":
-        net = way * current_share(profile, get) + body.load / body.stall_torque
+        net = way * current_share(profile, get) + body.turned_with / body.stall_torque
         return AtRate(math.copysign(most, net) if abs(net) > _NOTHING else 0.0)
     share = way * _output_share(profile, mode, get)
-    free = share + body.load / body.stall_torque  # gears hold what would turn it back
+    free = share + body.turned_with / body.stall_torque  # gears hold what would turn it back
     return AtRate(free * most if free * share > 0 else 0.0)
 
 
