@@ -7,7 +7,7 @@ import numpy as np
 from screwkin.gait.footsteps import first_side
 from screwkin.gait.motion import Motion, along, carried_point, together
 from screwkin.gait.record import Gait
-from screwkin.gait.splines import cyclic_cubic
+from screwkin.gait.splines import cyclic_cubic, resting_cubic
 from screwkin.gait.stance import Stance
 
 
@@ -18,8 +18,9 @@ def hands_motion(
 
     ``hand_forward`` [m] moves the hand on the side of the swinging foot, and the other one oppositely
     (walking paper, eq. 16-17, g = (-1)^n); ``hand_raise`` [m] lifts both above ``hand_drop`` below the
-    shoulder (eq. 18). Without these channels the hands rest there. Periodic C2 cubics: they overshoot the
-    paper's held ends by 4 % (1 mm), where holding them would let the acceleration jump.
+    shoulder (eq. 18). Without these channels the hands rest there. With ``cubic`` swings they rest between
+    key points of equal value, as the paper prints it, and their accelerations jump there as those of its feet
+    do; else they move on periodic C2 cubics, which overshoot such ends by 4 % (1 mm).
 
     Args:
         gait: its channels of the hands.
@@ -52,4 +53,5 @@ def _channel(gait: Gait, name: str, phase: Motion) -> Motion:
     channel = gait.channels.get(name)
     if channel is None:
         return phase * 0.0
-    return along(cyclic_cubic(channel.at, channel.value, channel.kind), phase)
+    through = resting_cubic if gait.swing == "cubic" else cyclic_cubic
+    return along(through(channel.at, channel.value, channel.kind), phase)

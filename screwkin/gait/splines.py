@@ -1,4 +1,4 @@
-"""Splines through key points: clamped cubic, minimum-jerk, and cyclic cubic.
+"""Splines through key points: clamped cubic, minimum-jerk, cyclic cubic without and with rests.
 
 All are functions f(x, order) of the phase in steps, for the value (order 0) and its derivatives.
 """
@@ -70,7 +70,7 @@ def extremes(spline: Any) -> tuple[Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class Cyclic:
-    """A C2 function over all steps: a spline of period two, plus ``slope`` per step."""
+    """A function over all steps: a spline of period two, plus ``slope`` per step."""
 
     spline: Any
     slope: float = 0.0
@@ -94,9 +94,46 @@ def cyclic_cubic(at: Array, value: Array, kind: str) -> Cyclic:
     from scipy.interpolate import CubicSpline
 
     slope = 1.0 if kind == "advance" else 0.0
-    x, y = at, value - slope * at
+    x, y = _cycle(at, value - slope * at, kind)
+    return Cyclic(CubicSpline(x, y, bc_type="periodic"), slope)
+
+
+def resting_cubic(at: Array, value: Array, kind: str) -> Cyclic:
+    """Constant between neighbouring key points of equal value, a clamped cubic from one such rest to the next.
+
+    Velocities are continuous, accelerations jump where a rest begins or ends. Without such key points it is
+    the ``cyclic_cubic``.
+
+    Args:
+        at: key times from 0 to 1 (a step) or to 2 (a cycle of two), in steps.
+        value: at those times.
+        kind: ``alternate`` or ``repeat``: how one step follows the other (see ``keypoints``).
+    """
+    from scipy.interpolate import PPoly
+
+    x, y = _cycle(at, value, kind)
+    resting = np.abs(np.diff(y)) <= 1e-12 * np.abs(y).max()
+    if not resting.any():
+        return cyclic_cubic(at, value, kind)
+    first = int(resting.argmax())  # the cycle is cut in a rest
+    x, y = np.r_[x[first:-1], x[: first + 1] + 2.0], np.r_[y[first:-1], y[: first + 1]]
+    resting = np.roll(resting, -first)
+    pieces, i = [], 0
+    while i < len(resting):
+        moving = int(np.argmax(np.r_[resting[i:], True]))  # number of intervals up to the next rest
+        if moving:
+            pieces.append(clamped_cubic(x[i : i + moving + 1], y[i : i + moving + 1]).c)
+        else:
+            pieces.append(np.array([[0.0], [0.0], [0.0], [y[i]]]))
+        i += max(moving, 1)
+    return Cyclic(PPoly(np.hstack(pieces), x, extrapolate="periodic"))
+
+
+def _cycle(at: Array, value: Array, kind: str) -> tuple[Array, Array]:
+    """Key points of two steps, the last one with the value of the first."""
+    x, y = at.copy(), value.copy()
     if at[-1] < 1.5:
         x = np.concatenate([at, 1 + at[1:]])
         y = np.concatenate([y, (-1 if kind == "alternate" else 1) * y[1:]])
     x[-1], y[-1] = 2.0, y[0]  # equal up to rounding, as checked; scipy wants it exactly
-    return Cyclic(CubicSpline(x, y, bc_type="periodic"), slope)
+    return x, y

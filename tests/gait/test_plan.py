@@ -57,6 +57,23 @@ def test_hands_follow_equations_16_to_18_below_their_shoulders(stance):
         assert relative[:, 2] == pytest.approx(0.121451 - 0.113 + raised, abs=1e-12)
 
 
+def test_hands_rest_at_their_ends_as_equations_16_to_18_print_it(stance):
+    """From 0 to .1 and from .8 to 1 Tc of every step nothing moves; in between no hand leaves its range."""
+    made = plan(load_gait("paper").replace(ramp=0, rate=1000.0), stance, 4)
+    part, n = made.phase % 1, np.floor(made.phase)
+    resting = (part < 0.1) | (part >= 0.8)
+    raised = 0.121451 - 0.113 + 0.0187
+    for hand, side in (("right_hand", -1), ("left_hand", 1)):
+        relative = made.hand_position[hand] - made.T_world_base[:, :3, 3]
+        end = -side * (-1) ** n * np.where(part < 0.5, -0.03, 0.03)
+        assert relative[resting, 0] == pytest.approx(end[resting], abs=1e-12)
+        assert relative[resting, 2] == pytest.approx(np.full(resting.sum(), raised), abs=1e-12)
+        assert np.abs(relative[:, 0]).max() < 0.03 + 1e-12
+        assert relative[:, 2].max() < raised + 1e-12
+        rate = made.hand_velocity[hand] - made.base_twist[:, 3:]
+        assert np.abs(rate[resting][:, [0, 2]]).max() < 1e-12
+
+
 @pytest.mark.parametrize("preset", PRESETS)
 def test_hands_never_come_near_the_reach_of_the_arm(stance, preset):
     made = plan(load_gait(preset), stance, 4)
@@ -98,9 +115,13 @@ def test_rates_and_accelerations_agree_with_differences_of_the_positions(stance,
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_waist_and_hands_have_continuous_accelerations(stance, preset):
-    """A jump keeps its size when the samples get denser; a continuous acceleration steps less and less."""
+    """A jump keeps its size when the samples get denser; a continuous acceleration steps less and less.
+
+    Hands of ``paper`` rest at their ends, so that their accelerations jump there, as those of its feet do.
+    """
     coarse, fine = (plan(load_gait(preset).replace(rate=rate), stance, 3) for rate in (500.0, 4000.0))
-    for of in (lambda p: p.base_acceleration, lambda p: p.hand_acceleration["left_hand"]):
+    hands = [] if preset == "paper" else [lambda p: p.hand_acceleration["left_hand"]]
+    for of in (lambda p: p.base_acceleration, *hands):
         steps = [np.abs(np.diff(of(made), axis=0)).max() for made in (coarse, fine)]
         assert steps[1] < steps[0] / 6
 

@@ -7,7 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from screwkin.gait.splines import clamped_cubic, cyclic_cubic, extremes, held_constant, minimum_jerk
+from screwkin.gait.splines import (
+    clamped_cubic,
+    cyclic_cubic,
+    extremes,
+    held_constant,
+    minimum_jerk,
+    resting_cubic,
+)
 
 AT = np.array([0.1, 0.14, 0.2, 0.5, 0.8, 0.86, 0.89])
 UP = np.array([0.0, 0.1, 0.3, 1.0, 0.3, 0.1, 0.0])
@@ -87,6 +94,28 @@ def test_a_cyclic_cubic_joins_step_to_step_with_two_derivatives(inner, kind):
             np.testing.assert_allclose(
                 channel(n + at - 1e-10, order), channel(n + at + 1e-10, order), atol=1e-5
             )
+
+
+@given(
+    st.lists(st.sampled_from([-1.0, -0.5, 0.0, 0.3, 1.0]), min_size=3, max_size=7),
+    st.sampled_from(["alternate", "repeat"]),
+)
+def test_a_resting_cubic_is_constant_between_equal_neighbours_and_turns_without_a_kink(inner, kind):
+    value = np.array([*inner, -inner[0] if kind == "alternate" else inner[0]])
+    at = np.linspace(0, 1, len(value))
+    channel = resting_cubic(at, value, kind)
+    for n in range(4):
+        signed = value * (-1) ** n if kind == "alternate" else value
+        np.testing.assert_allclose(channel(n + at, 0), signed, atol=1e-12)
+        for i in np.flatnonzero(np.diff(value) == 0):
+            within = n + np.linspace(at[i], at[i + 1], 7)
+            np.testing.assert_allclose(channel(within, 0), signed[i], atol=1e-12)
+            np.testing.assert_allclose(channel(within, 1), 0.0, atol=1e-10)
+        before, after = channel(n + at - 1e-9, 1), channel(n + at + 1e-9, 1)
+        np.testing.assert_allclose(before, after, atol=1e-5)
+    rests = (np.diff(value) == 0).any()
+    if not rests:
+        np.testing.assert_array_equal(channel(at, 2), cyclic_cubic(at, value, kind)(at, 2))
 
 
 def test_key_points_told_for_two_steps_give_the_same_as_for_one_when_they_repeat():
