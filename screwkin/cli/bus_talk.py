@@ -33,6 +33,7 @@ from screwkin.servo.survey import (
     comparable,
     each_once,
     measured_angles,
+    old_firmware,
     readings,
     scan,
     servo_differences,
@@ -71,13 +72,14 @@ def bus_scan(
     if as_json:
         rows = [
             {"id": f.id, "model": f.name, "number": f.model, "protocol": f.protocol, "baud": f.baud}
+            | {"firmware": f.firmware}
             for f in answering
         ]
         details = [one.to_dict() for one in registers]
         times = trip.to_dict() if trip else None
         print_json({"servos": rows, "differences": wrong, "registers": details, "round_trip": times})
     else:
-        cells = [(f.id, f.name, f"protocol {f.protocol}", f"{f.baud} baud") for f in answering]
+        cells = [(f.id, f.name, f"protocol {f.protocol}", f"{f.baud} baud", _version(f)) for f in answering]
         print(aligned(cells, "  ") if cells else "no servo answers; are power and port right?")
         for line in wrong:
             print(line)
@@ -85,7 +87,13 @@ def bus_scan(
             print(f"an answer takes {trip}")
     if trip and trip.is_slow:
         remark(f"That is slow: {latency_advice(port)}.")
+    for line in old_firmware(answering):
+        remark(f"{line}.")
     return 3 if wrong or not answering else 0
+
+
+def _version(servo: AnsweringServo) -> str:
+    return "" if servo.firmware is None else f"firmware {servo.firmware}"
 
 
 def _examined(

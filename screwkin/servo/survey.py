@@ -26,12 +26,16 @@ _ENOUGH = 8  # answers after which the patience follows them
 
 @dataclass(frozen=True)
 class AnsweringServo:
-    """A servo that answered: model is its number, -1 where only damaged packets came, -2 to a ping alone."""
+    """A servo that answered: model is its number, -1 where only damaged packets came, -2 to a ping alone.
+
+    firmware: its version, None where the model is not known.
+    """
 
     id: int
     model: int
     protocol: ProtocolName
     baud: int
+    firmware: int | None = None
 
     @property
     def profiles(self) -> tuple[str, ...]:
@@ -66,9 +70,11 @@ def scan(
         progress(id)
         if not bus.present(id):
             continue
+        firmware = None
         try:
             number = bus.ping(id)
             _spoiled(bus, id, number)
+            firmware = _firmware(bus, id, number)
         except LineLostError:
             raise
         except DamagedError:
@@ -77,8 +83,36 @@ def scan(
             number = UNREAD
         if (trip := round_trip(bus)) and trip.count >= _ENOUGH:
             bus.patience = trip.patience
-        answering.append(AnsweringServo(id, number, bus.protocol, bus.baud))
+        answering.append(AnsweringServo(id, number, bus.protocol, bus.baud, firmware))
     return answering
+
+
+def _firmware(bus: Bus, id: int, number: int) -> int | None:
+    known = AnsweringServo(id, number, bus.protocol, bus.baud).profiles
+    if not known:
+        return None
+    register = load_profile(known[0]).register("firmware")
+    return bus.read(id, register.address, register.width).value
+
+
+def old_firmware(answering: Sequence[AnsweringServo]) -> list[str]:
+    """Servos whose firmware is older than what a play can use of their model, and what that is."""
+    lines = []
+    for servo in answering:
+        if servo.firmware is None:
+            continue
+        profile = load_profile(servo.profiles[0])
+        first = {
+            "one packet reads all servos": profile.fast_sync_read or 0,
+            "a servo's registers are read side by side": profile.indirect.firmware if profile.indirect else 0,
+        }
+        newer = [f"from {at} on {what}" for what, at in first.items() if servo.firmware < at]
+        if newer:
+            lines.append(
+                f"servo {servo.id} ({servo.name}) has firmware {servo.firmware}: {'; '.join(newer)}. A play "
+                "reads it in the older way; its maker's tool updates it"
+            )
+    return lines
 
 
 def _spoiled(bus: Bus, id: int, number: int) -> None:

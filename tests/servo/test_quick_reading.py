@@ -9,6 +9,7 @@ from screwkin.servo.budget import budget
 from screwkin.servo.gate import Bounds
 from screwkin.servo.player import Player, PlaySettings
 from screwkin.servo.reading import Readings
+from screwkin.servo.survey import old_firmware, scan
 from screwkin.servo.virtual.faults import InjectedFault
 from tests.servo.benches import Bench, X
 from tests.servo.test_models_play import fitted, one_step
@@ -154,3 +155,19 @@ def test_a_play_that_reads_so_notices_what_any_play_notices(injected, kinds):
     read_at = player.log.arrays({})["read_at"]
     before = player.log.arrays({})["time"] < min(fault.time, 1.7)
     assert np.isfinite(read_at[before]).all(), "every servo in every frame"
+
+
+@pytest.mark.parametrize("model", ["XL330-M288", "XM430-W350", "MX-28-2", "AX-12A"])
+def test_a_scan_names_firmware_that_is_older_than_what_a_play_uses(model):
+    bench = Bench(model, count=3)
+    newest = bench.servos[0].get("firmware")
+    assert {servo.firmware for servo in scan(bench.bus, range(1, 4))} == {newest}
+    assert old_firmware(scan(bench.bus, range(1, 4))) == []
+    bench.servos[1].put("firmware", 44)
+    profile = bench.profile
+    wanted = [profile.fast_sync_read, profile.indirect.firmware if profile.indirect else None]
+    told = old_firmware(scan(bench.bus, range(1, 4)))
+    assert len(told) == any(first and first > 44 for first in wanted)
+    for line in told:
+        assert f"servo 2 ({model}) has firmware 44" in line
+        assert all((f"from {first} on" in line) == (first > 44) for first in wanted if first)
