@@ -18,7 +18,9 @@ from screwkin.mechanism.singularity import LimbSingularity
 from screwkin.model.coupled import coupling_text
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
+from screwkin.report.graph import mechanism_graph
 from screwkin.report.singular import save_singularities
+from screwkin.report.style import save_figure, styled
 from screwkin.sim.self_collision import touching_at_home
 
 
@@ -43,6 +45,9 @@ def info(
             help="Go there with closed loops [rad or m]; may be repeated.",
         ),
     ] = None,
+    graph: Annotated[
+        bool, typer.Option("--graph", help="Draw the graph of links, couplings and circuits.")
+    ] = False,
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", metavar="DIR", help="Folder for pictures of what is singular."),
@@ -58,9 +63,9 @@ def info(
         primary,
         assignments("--move", move or [], "crank=0.5"),
     )
-    if output is not None:
+    if graph or output is not None:
         with output_folder(output, "info", facts.robot.name) as folder:
-            for path in drawn(lambda: save_singularities(facts.robot, facts.state, facts.limbs, folder)):
+            for path in drawn(lambda: _pictures(facts, folder, graph)):
                 remark(f"wrote {path}")
     if as_json:
         touching = _touching(facts.robot)
@@ -71,6 +76,15 @@ def info(
     else:
         print(_text(facts))
     return 0
+
+
+def _pictures(facts: Facts, folder: Path, graph: bool) -> list[Path]:
+    """Pictures of what is singular, and of the graph if it is wanted."""
+    paths = list(save_singularities(facts.robot, facts.state, facts.limbs, folder))
+    if graph:
+        with styled():
+            paths.append(save_figure(mechanism_graph(facts.mechanism), folder / "graph.png"))
+    return paths
 
 
 def _touching(robot: Robot) -> list[tuple[str, str]] | None:

@@ -131,3 +131,8 @@ def test_a_move_or_a_choice_that_cannot_be_is_refused(cli, words, code, message)
     called = cli("info", "linkages/four-bar", *words)
     assert called.code == code
     assert message in called.err
+
+
+def test_the_graph_is_drawn_where_it_is_asked_for(cli, tmp_path):
+    assert cli("info", "linkages/four-bar", "--graph", "-o", "out").code == 0
+    assert (tmp_path / "out" / "graph.png").stat().st_size > 10_000
