@@ -1,8 +1,8 @@
 """python -m benchmarks.solvers FILE... [--rows FILE] [-o FILE]: do finer settings change a verdict?
 
-Every public robot, as its file has it, stands, squats and walks in both engines on rigid servos, at usual
-settings, at half the step and at twice the iterations (``validate --check-solver``). Each motion's row is
-appended to the rows file at once, and motions that stand there are not tried again.
+Every public robot, as its file has it, stands, squats and walks on rigid servos, in MuJoCo and then in
+PyBullet, at usual settings, at half the step and at twice the iterations (``validate --check-solver``). Each
+row, a motion in an engine, is appended to the rows file at once; rows that stand there are not run again.
 """
 
 from __future__ import annotations
@@ -22,15 +22,24 @@ import numpy as np
 import screwkin as sk
 from benchmarks.environments import ROOT
 from benchmarks.machine import pin_threads
+from screwkin.analysis.engines import Engine
 from screwkin.anatomy.humanoid import humanoid
 from screwkin.gait.balance import zmp
 
 MOTIONS = ("stand", "squat", "walk")
+ENGINES: tuple[Engine, ...] = ("mujoco", "pybullet")
+"""The faster one first."""
 DEPTH = 0.08
 """How far a squat lowers the base, as a share of its height."""
 ALLOWED = 2.0
 """How far the RMS of the contact ZMP against the plan may move [mm]."""
 Row = dict[str, Any]
+
+
+@cache
+def planned(path: Path, name: str) -> sk.Trajectory:
+    """The motion of that name for the robot of a file."""
+    return motion_of(robot_of(path), name)
 
 
 def motion_of(robot: sk.Robot, name: str) -> sk.Trajectory:
@@ -81,16 +90,29 @@ def robot_of(path: Path) -> sk.Robot:
     return humanoid(sk.load_robot(path))
 
 
-def row_of(path: Path, name: str) -> Row:
-    """What becomes of a motion, or the reason where there is no such motion."""
-    row: Row = {"file": str(path), "motion": name}
+def row_of(path: Path, name: str, engine: Engine) -> Row:
+    """What becomes of a motion in an engine, or the reason where there is no such motion."""
+    row: Row = {"file": str(path), "motion": name, "engine": engine}
     try:
         robot = robot_of(path)
         row |= {"name": robot.name, "mass": float(robot.mass), "joints": len(robot.joints)}
-        check = sk.validate(robot, motion_of(robot, name), check_solver=True)
+        check = sk.validate(robot, planned(path, name), engine, servo="rigid", check_solver=True)
         return row | {"engines": check.solver, "reasons": list(check.reasons)}
     except sk.ScrewkinError as error:
         return row | {"reason": str(error).splitlines()[0]}
+
+
+def merged(rows: Sequence[Row]) -> list[Row]:
+    """One row for every motion, with all its engines; in the order of robots and motions."""
+    motions: dict[tuple[str, str], Row] = {}
+    for row in rows:
+        one = motions.setdefault((row["file"], row["motion"]), dict(row))
+        if "engines" in row:
+            one["engines"] = {**one.get("engines", {}), **row["engines"]}
+    return sorted(
+        motions.values(),
+        key=lambda row: (row.get("name", row["file"]), row["file"], MOTIONS.index(row["motion"])),
+    )
 
 
 def same(row: Row) -> bool:
@@ -107,6 +129,7 @@ def _moved(own: Row) -> float:
 
 def markdown(rows: Sequence[Row]) -> str:
     """A line for every motion."""
+    rows = merged(rows)
     simulated = [row for row in rows if "engines" in row]
     lines = [
         "# Verdicts at finer settings",
@@ -148,16 +171,15 @@ def main(arguments: list[str] | None = None) -> int:
     asked.rows.parent.mkdir(parents=True, exist_ok=True)
     text = asked.rows.read_text(encoding="utf-8") if asked.rows.exists() else ""
     rows = [json.loads(line) for line in text.splitlines()]
-    done = {(row["file"], row["motion"]) for row in rows}
+    done = {(row["engine"], row["motion"], row["file"]) for row in rows}
     with asked.rows.open("a", encoding="utf-8") as file:
-        for name, path in product(MOTIONS, asked.files):
-            if (str(path), name) in done:
+        for engine, name, path in product(ENGINES, MOTIONS, asked.files):
+            if (engine, name, str(path)) in done:
                 continue
-            rows.append(row := row_of(path, name))
+            rows.append(row := row_of(path, name, engine))
             file.write(json.dumps(row) + "\n")
             file.flush()
-            print(path.name, name, row.get("engines") or row["reason"], flush=True)
-    rows.sort(key=lambda row: (row.get("name", row["file"]), MOTIONS.index(row["motion"])))
+            print(path.name, name, engine, row.get("engines") or row["reason"], flush=True)
     asked.output.parent.mkdir(parents=True, exist_ok=True)
     asked.output.write_text(markdown(rows), encoding="utf-8")
     print(markdown(rows))

@@ -99,7 +99,7 @@ def cyclic_cubic(at: Array, value: Array, kind: str) -> Cyclic:
 
 
 def resting_cubic(at: Array, value: Array, kind: str) -> Cyclic:
-    """Constant between neighbouring key points of equal value, a clamped cubic from one such rest to the next.
+    """Constant between neighbouring key points of equal value, clamped cubics between such rests.
 
     Velocities are continuous, accelerations jump where a rest begins or ends. Without such key points it is
     the ``cyclic_cubic``.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import screwkin as sk
-from benchmarks.solvers import Row, markdown, motion_of, same
+from benchmarks.solvers import Row, markdown, merged, motion_of, same
 
 
 def row(usual: bool, finer: bool, rms: list[float]) -> Row:
@@ -23,10 +23,22 @@ def row(usual: bool, finer: bool, rms: list[float]) -> Row:
 def test_a_verdict_outlasts_finer_settings_if_neither_it_nor_its_zmp_moves() -> None:
     rows = [row(True, True, [0.1, 1.9]), row(True, True, [0.1, 2.9]), row(True, False, [0.1, 0.2])]
     assert [same(one) for one in rows] == [True, False, False]
+    assert markdown(rows[:1]).count("| walk |") == 1
+    rows = [one | {"file": f"{k}.urdf"} for k, one in enumerate(rows)]
     text = markdown([*rows, {"file": "b.urdf", "motion": "stand", "reason": "no legs"}])
     assert "1 of 3 motions" in text
     assert "| one | 30.0 | 12 | walk |  |  | passes | 0.10 to 1.90 |" in text
     assert "| b | 0.0 |  | stand | no legs |" in text
+
+
+def test_rows_of_both_engines_are_one_line_that_needs_both() -> None:
+    good, bad = row(True, True, [0.1, 0.2]), row(True, False, [0.3, 0.4])
+    other = {**bad, "engines": {"pybullet": bad["engines"]["mujoco"]}}
+    (one,) = merged([good, other])
+    assert list(one["engines"]) == ["mujoco", "pybullet"]
+    assert same(good)
+    assert not same(one)
+    assert "| walk | fails/passes | 0.30 to 0.40 | passes | 0.10 to 0.20 |" in markdown([good, other])
 
 
 def test_a_squat_goes_down_and_up_with_the_feet_in_place() -> None:
