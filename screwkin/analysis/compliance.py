@@ -22,7 +22,7 @@ from screwkin.gait.compensation import WAYS, compensate_walk, way_of
 from screwkin.gait.ground import ground_of
 from screwkin.model.robot import Robot
 from screwkin.sim.compliant import STEP, Compliance, SpringServos
-from screwkin.sim.measure import ZmpRecord, zmp_record
+from screwkin.sim.measure import ZmpRecord, landing_leads, zmp_record
 from screwkin.sim.pybullet import Physics, PyBulletBackend
 from screwkin.sim.run import Schedule, simulate
 from screwkin.trajectory import Trajectory
@@ -55,7 +55,8 @@ class Conditions:
 class Trial:
     """One run: time of its fall [s] or None; largest |x| and |y| error of the ZMP [mm], up to a fall.
 
-    zmp: its ZMP beside the planned one.
+    zmp: its ZMP beside the planned one; leads: by how much every swinging foot touches the floor before its
+    planned landing [s].
     """
 
     treatment: Treatment
@@ -64,6 +65,7 @@ class Trial:
     fell_at: float | None
     zmp_max_mm: Pair
     zmp: ZmpRecord | None = field(default=None, repr=False, compare=False)
+    leads: tuple[float, ...] = field(default=(), repr=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -83,11 +85,11 @@ class StudyRow:
     trials: tuple[Trial, ...]
 
     def to_dict(self) -> dict[str, Any]:
-        """All but the ZMPs over time, as JSON data."""
+        """All but the ZMPs over time and the landings, as JSON data."""
         bare = replace(self, trials=tuple(replace(trial, zmp=None) for trial in self.trials))
         data = asdict(bare)
         for trial in data["trials"]:
-            del trial["zmp"]
+            del trial["zmp"], trial["leads"]
         return data
 
 
@@ -202,7 +204,9 @@ def _trial(
     error = 1e3 * np.abs(zmp.contact - zmp.planned)
     error = error[np.isfinite(error).all(axis=1)]
     x, y = error.max(axis=0).tolist() if len(error) else (np.nan, np.nan)
-    return Trial(treatment, friction, dt, run.fallen_at, (x, y), zmp)
+    legs = tuple(limb.tip for limb in robot.limbs if limb.kind == "leg")
+    leads = tuple(landing_leads(run, commanded, legs).tolist())
+    return Trial(treatment, friction, dt, run.fallen_at, (x, y), zmp, leads)
 
 
 def _stood(trials: Sequence[Trial], treatment: Treatment) -> Array:

@@ -7,6 +7,7 @@ import platform
 import shlex
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from textwrap import shorten
 from typing import Annotated
 
 import typer
@@ -22,6 +23,8 @@ from screwkin.papers.reproduce import Reproduction, check_paper
 from screwkin.papers.reproduce import reproduce as measured
 from screwkin.papers.scatter import FEW
 
+_QUOTED = 40
+"""Letters of a quotation beside its value; files and what differs have all of it."""
 _TRACED = ("screwkin", "numpy", "scipy", "pybullet")
 
 
@@ -101,8 +104,16 @@ def _text(result: Reproduction) -> str:
     parts = [result.paper.title]
     for section in result.sections:
         if section.lines:
-            cells = [row[:4] for row in section.cells]
-            parts += ["", section.title, aligned([("", "paper", "ours", ""), *cells], "  ")]
+            head = ("", "paper", "ours", "", "kind", "in the paper's text")
+            cells = [
+                (
+                    *row[:4],
+                    line.kind if line.quote else "ours alone",
+                    shorten(line.quote, _QUOTED, placeholder="…"),
+                )
+                for row, line in zip(section.cells, section.lines, strict=True)
+            ]
+            parts += ["", section.title, aligned([head, *cells], "  ")]
     differing = [
         f"  {line.item}: {line.note} In the paper: {line.source}"
         for line in result.lines

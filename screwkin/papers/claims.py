@@ -33,6 +33,7 @@ UNITS: Mapping[str, float] = {
     "s": 1.0,
     "ms": 1e3,
     "%": 100.0,
+    "N m": 1.0,
     "N m/rad": 1.0,
 }
 """How many of a unit make one of the SI."""

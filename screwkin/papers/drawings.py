@@ -6,16 +6,14 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from screwkin.algebra.arrays import Array
-from screwkin.algebra.se3 import as_array, unstack
 from screwkin.analysis.compliance import Trial
 from screwkin.errors import InputError
 from screwkin.gait.balance import soles_on_floor
-from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.papers.bench import Bench
-from screwkin.papers.measures_leg import FINE, compensated_of, map_of, sinking_of, zmp_lines
+from screwkin.papers.measures_leg import FINE, compensated_of, foot_from_waist, map_of, sinking_of, zmp_lines
 from screwkin.papers.measures_springs import trial_of
 from screwkin.report import balance, frames, maps, motion
+from screwkin.report.graph import mechanism_graph
 from screwkin.report.style import (
     LINES,
     MEASURED,
@@ -47,10 +45,16 @@ def _of_walk(draw: Callable[..., Figure | None], **options: object) -> Drawing:
     return drawing
 
 
-def walking(bench: Bench, gait: str, steps: int | None = None) -> Figure:
-    """Frames of the simulated walk."""
+def walking(bench: Bench, gait: str, steps: int | None = None, cycles: bool = False) -> Figure:
+    """Frames of the simulated walk: within a gait cycle, or where the ``cycles`` begin and end."""
     account = bench.account(gait, steps)
-    return frames.frames_of_run(account, bench.validation(account).run)
+    times = frames.cycle_times(account) if cycles else None
+    return frames.frames_of_run(account, bench.validation(account).run, times)
+
+
+def mechanism(bench: Bench, robot: str = "") -> Figure:
+    """The graph of the closed mechanism of a robot; default: the paper's."""
+    return mechanism_graph(bench.facts(robot).mechanism)
 
 
 def reach_maps(bench: Bench, limb: str, heights: Sequence[float], resolution: float = FINE) -> Figure:
@@ -106,7 +110,7 @@ def compensated_joints(bench: Bench, gait: str, limb: str, stiffness: float) -> 
 def commanded_foot(bench: Bench, gait: str, limb: str, stiffness: float) -> Figure:
     """The foot seen from the waist along x, y and z, as planned and as compensation commands it."""
     account = bench.account(gait)
-    planned, commanded = _seen_from_waist(bench, gait, limb, stiffness)
+    planned, commanded = foot_from_waist(bench, gait, limb, stiffness)
     figure, axes = time_figure(account, 6.0, 3)
     for k, one in enumerate(axes):
         one.plot(account.trajectory.time, 1e3 * planned[:, k], color=PLAIN, label="intended")
@@ -118,26 +122,13 @@ def commanded_foot(bench: Bench, gait: str, limb: str, stiffness: float) -> Figu
 def compensated_foot(bench: Bench, gait: str, limb: str, stiffness: float) -> Figure:
     """By how much compensation moves the commanded foot, seen from the waist."""
     account = bench.account(gait)
-    planned, commanded = _seen_from_waist(bench, gait, limb, stiffness)
+    planned, commanded = foot_from_waist(bench, gait, limb, stiffness)
     figure, axes = time_figure(account, 3.0)
     for k, colour in enumerate((SIDES[0], SIDES[1], PLAIN)):
         moved = 1e3 * (commanded - planned)[:, k]
         axes.plot(account.trajectory.time, moved, color=colour, label="xyz"[k], linestyle=LINES[k])
     axes.set_ylabel(f"{shown(account.robot.limb(limb).tip)} moved by [mm]")
     return finished(figure, account)
-
-
-def _seen_from_waist(bench: Bench, gait: str, limb: str, stiffness: float) -> list[Array]:
-    """Places (T, 3) [m] of a limb's tip in the waist's frame, as planned and as commanded."""
-    account = bench.account(gait)
-    commanded = compensated_of(bench, gait, stiffness).q
-    tip = account.robot.limb(limb).tip
-    return [
-        as_array(pose_in_base(account.robot, link_displacements(account.robot, unstack(q)), tip), (len(q),))[
-            :, :3, 3
-        ]
-        for q in (account.trajectory.q, commanded)
-    ]
 
 
 def sprung_zmp(bench: Bench, gait: str, treatments: Sequence[str], stiffness: float) -> Figure:
@@ -207,6 +198,7 @@ DRAWINGS: Mapping[str, Drawing] = {
     "waist_along_y": _of_walk(motion.waist_along_y),
     "joint_angles": _of_walk(motion.joint_angles),
     "walking": walking,
+    "mechanism": mechanism,
     "planned": _of_walk(frames.frames_drawn),
     "zmp_along_x": _of_walk(balance.zmp_against_gcom, axis=0),
     "zmp_along_y": _of_walk(balance.zmp_against_gcom, axis=1),

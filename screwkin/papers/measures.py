@@ -17,6 +17,9 @@ _ALL: tuple[Measure, ...] = (
     measures_table.middle_of_link,
     measures_table.axis,
     measures_table.limits,
+    measures_table.range_share,
+    measures_table.torque_limit,
+    measures_table.tilt,
     measures_table.sole,
     measures_table.size,
     measures_table.reference_error,
@@ -27,6 +30,8 @@ _ALL: tuple[Measure, ...] = (
     measures_walk.key_points,
     measures_walk.feet_apart,
     measures_walk.swing_height,
+    measures_walk.cycle_ends,
+    measures_walk.largest_effort,
     measures_walk.spike_phases,
     measures_walk.simulated,
     measures_leg.ik_ratio,
@@ -35,7 +40,11 @@ _ALL: tuple[Measure, ...] = (
     measures_leg.deflection,
     measures_leg.gains,
     measures_leg.compensation,
+    measures_leg.command_changes,
+    measures_leg.most_changed,
+    measures_leg.swing_corrections,
     measures_springs.on_springs,
+    measures_springs.landing,
 )
 
 MEASURES: Mapping[str, Measure] = {

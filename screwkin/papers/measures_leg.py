@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import as_array, unstack
 from screwkin.analysis.ik_study import IkRow, IkStudy, ik_study
 from screwkin.analysis.stiffness_maps import DeflectionMap, stiffness_maps
 from screwkin.analysis.workspace import WorkspaceMap, workspace
@@ -17,6 +18,7 @@ from screwkin.gait.footsteps import footholds
 from screwkin.gait.preview import follow_reference, preview_gains
 from screwkin.gait.preview_plan import zmp_reference
 from screwkin.gait.stance import stance_of
+from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.papers.bench import Bench
 from screwkin.trajectory import Trajectory
 
@@ -173,3 +175,57 @@ def compensation(
         for row in (rows[0], rows[-1])
     )
     return {"before": before, "after": after, "removed": 1.0 - after / before}[what]
+
+
+def foot_from_waist(bench: Bench, gait: str, limb: str, stiffness: float) -> tuple[Array, Array]:
+    """Places (T, 3) [m] of a limb's tip in the waist's frame: planned, and commanded to compensate."""
+    robot, walk = bench.robot, bench.account(gait).trajectory
+    tip = robot.limb(limb).tip
+    planned, commanded = (
+        as_array(pose_in_base(robot, link_displacements(robot, unstack(q)), tip), (len(q),))[:, :3, 3]
+        for q in (walk.q, compensated_of(bench, gait, stiffness).q)
+    )
+    return planned, commanded
+
+
+def command_changes(bench: Bench, gait: str, limb: str, stiffness: float) -> Array:
+    """Largest change (k,) [rad] of the commands of a limb's joints by the swing foot's compensation."""
+    robot, walk = bench.robot, bench.account(gait).trajectory
+    changed = np.abs(compensated_of(bench, gait, stiffness).q - walk.q).max(axis=0)
+    return np.asarray(changed[list(robot.path_to(robot.limb(limb).link))])
+
+
+def most_changed(bench: Bench, gait: str, limb: str, count: int, stiffness: float) -> str:
+    """The joints of a limb whose commands compensation changes most, from the waist to the tip."""
+    path = bench.robot.path_to(bench.robot.limb(limb).link)
+    largest = np.argsort(command_changes(bench, gait, limb, stiffness))[-count:]
+    return ", ".join(bench.robot.joint_names[path[i]].replace("_", " ") for i in sorted(largest))
+
+
+def swing_corrections(bench: Bench, gait: str, limb: str, key: str, stiffness: float) -> float | str:
+    """How far compensation moves a foot [m]: in its ``first`` swing, median of the ``others``, ``standing``.
+
+    ``order``: whether the first is lower than any other; ``stride``: length of the first swing over the
+    median of the others.
+    """
+    trajectory = bench.account(gait).trajectory
+    foot = bench.robot.limb(limb).tip
+    planned, commanded = foot_from_waist(bench, gait, limb, stiffness)
+    moved = np.linalg.norm(commanded - planned, axis=1)
+    stands = trajectory.contact[:, trajectory.feet.index(foot)]
+    flying = np.flatnonzero(~stands)
+    swings = np.split(flying, np.flatnonzero(np.diff(flying) > 1) + 1)
+    x = trajectory.T_world_tip[foot][:, 0, 3]
+    lengths = [abs(x[min(rows[-1] + 1, len(x) - 1)] - x[rows[0] - 1]) for rows in swings]
+    first, *others = (float(moved[rows].max()) for rows in swings)
+    return one_of(
+        "correction of a foot",
+        key,
+        {
+            "first": first,
+            "others": float(np.median(others)),
+            "standing": float(moved[stands].max()),
+            "order": "lower" if first < min(others) else "not lower",
+            "stride": float(lengths[0] / np.median(lengths[1:])),
+        },
+    )

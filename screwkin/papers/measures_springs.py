@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from screwkin.analysis.account import Account
 from screwkin.analysis.compliance import (
     TREATMENTS,
@@ -12,9 +14,10 @@ from screwkin.analysis.compliance import (
     compliance_study,
     summarised,
 )
-from screwkin.errors import one_of
+from screwkin.errors import InputError, one_of
 from screwkin.papers.bench import Bench
 from screwkin.papers.scatter import FEW, Scatter, shaken
+from screwkin.sim.measure import landings
 
 FRICTIONS = (0.8, 1.0)
 KEYS = ("x", "y", "cut x", "cut y", "fallen")
@@ -74,3 +77,27 @@ def on_springs(bench: Bench, gait: str, treatment: str, key: str, stiffness: flo
     if what == "cut":
         return row.cut[k] if row.cut is not None else "none completes without it"
     return Scatter(tuple(1e-3 * one.zmp_max_mm[k] for one in row.trials if one.fell_at is None))
+
+
+def landing(bench: Bench, gait: str, treatment: str, key: str, stiffness: float) -> float | str:
+    """When swinging feet touch the floor, of the run at the largest friction.
+
+    ``lead``: median of the times before the planned double support [s]; ``peak``: time from the beginning of
+    the nearest planned double support to the largest ZMP error [s]; ``order``: whether most touch ``before``
+    it.
+    """
+    trial = trial_of(bench, gait, treatment, stiffness)
+    if trial.zmp is None or not trial.leads:
+        raise InputError(f"the run with treatment {treatment} has no landings")
+    lead = float(np.median(trial.leads))
+    error = np.linalg.norm(trial.zmp.contact - trial.zmp.planned, axis=1)
+    away = trial.zmp.time[int(np.nanargmax(error))] - landings(bench.account(gait).trajectory)
+    return one_of(
+        "number of a landing",
+        key,
+        {
+            "lead": lead,
+            "peak": float(away[np.abs(away).argmin()]),
+            "order": "before" if lead > 0.0 else "not before",
+        },
+    )

@@ -31,10 +31,10 @@ MECHANISM = (
 )
 
 
-def mass(bench: Bench, link: str = "") -> float:
-    """Mass [kg] of a link, or of the whole robot."""
+def mass(bench: Bench, link: str = "", beside: float = 0.0) -> float:
+    """Mass [kg] of a link, or of the whole robot; by how much it is above that of another robot."""
     table = bench.robot
-    return float(table.link(link).mass if link else table.mass)
+    return float(table.link(link).mass if link else table.mass) - beside
 
 
 def link_center(bench: Bench, link: str) -> Array:
@@ -56,11 +56,19 @@ def zero_pose_place(bench: Bench, at: Sequence[str], seen_from: Sequence[str] = 
     return _middle(table, at) - (_middle(table, seen_from) if seen_from else 0.0)
 
 
-def zero_pose_distance(bench: Bench, between: Sequence[str], along: str = "") -> float:
-    """Distance [m] of two places in the zero pose, or of their coordinates along x, y or z."""
-    first, second = (_place(bench.robot, name) for name in between)
-    gap = second - first
-    return float(abs(gap["xyz".index(along)]) if along else np.linalg.norm(gap))
+def zero_pose_distance(bench: Bench, between: Sequence[str], along: str = "", beside: float = 0.0) -> float:
+    """Distance [m] of two places in the zero pose, or of their coordinates along x, y or z.
+
+    Or by how much it is above that of another robot.
+    """
+    gap = _gap(bench.robot, between)
+    return float(abs(gap["xyz".index(along)]) if along else np.linalg.norm(gap)) - beside
+
+
+def tilt(bench: Bench, between: Sequence[str]) -> float:
+    """Angle [rad] of the line between two places from the vertical, seen from the front, in the zero pose."""
+    _, y, z = _gap(bench.robot, between)
+    return float(np.arctan2(abs(y), abs(z)))
 
 
 def axis(bench: Bench, joint: str) -> Array:
@@ -74,18 +82,33 @@ def limits(bench: Bench, joint: str) -> Array:
     return np.array([one.lower, one.upper])
 
 
+def range_share(bench: Bench, joint: str, of: Sequence[float]) -> float:
+    """Which share of another range of angles [deg] lies within a joint's own."""
+    lower, upper = np.degrees(limits(bench, joint))
+    return float(max(0.0, min(upper, of[1]) - max(lower, of[0])) / (of[1] - of[0]))
+
+
+def torque_limit(bench: Bench, joint: str) -> float:
+    """Largest torque [N m] of a joint's servo."""
+    return float(bench.robot.joint(joint).effort)
+
+
 def sole(bench: Bench, limb: str) -> Array:
     """Length and width (2,) of a sole [m]."""
     chosen = one_of("sole", limb, {one.limb: one for one in bench.robot.soles})
     return np.asarray(np.ptp([_vector(corner)[:2] for corner in chosen.corners], axis=0))
 
 
-def size(bench: Bench, along: str = "xyz", link: str = "") -> Array:
-    """Length, width and height (3,) [m] of the boxes of a link or of all, or those named by letters."""
+def size(bench: Bench, along: str = "xyz", link: str = "", beside: Sequence[float] = ()) -> Array:
+    """Length, width and height (3,) [m] of the boxes of a link or of all, or those named by letters.
+
+    Or by how much they are above those of another robot.
+    """
     table = bench.robot
     boxes = [box for one in ([table.link(link)] if link else table.links) for box in one.boxes]
     ends = [_vector(box.center) + sign * _vector(box.size) / 2 for box in boxes for sign in (-1, 1)]
-    return np.asarray(np.ptp(ends, axis=0)[["xyz".index(letter) for letter in along]])
+    own = np.ptp(ends, axis=0)[["xyz".index(letter) for letter in along]]
+    return np.asarray(own - (beside or 0.0))
 
 
 def reference_error(bench: Bench, limb: str, reference: Sequence[str]) -> float:
@@ -150,6 +173,11 @@ def _place(robot: Robot, name: str) -> Array:
     if name in robot.joint_names:
         return _vector(robot.joint(name).screw.s0)
     return _vector(robot.frame(name)[1].p)
+
+
+def _gap(robot: Robot, between: Sequence[str]) -> Array:
+    first, second = (_place(robot, name) for name in between)
+    return second - first
 
 
 def _middle(robot: Robot, names: Sequence[str]) -> Array:

@@ -9,9 +9,11 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.analysis.account import Account
+from screwkin.analysis.contact_account import forces_of
 from screwkin.errors import InputError, one_of
 from screwkin.papers.bench import Bench
 from screwkin.papers.scatter import Scatter
+from screwkin.report.frames import cycle_times
 
 Changes = Mapping[str, str | float] | None
 
@@ -66,9 +68,20 @@ def feet_apart(bench: Bench, gait: str, step: int, steps: int = 6, changes: Chan
     return float(np.ptp([_path(account, foot)[row, 0] for foot in account.trajectory.feet]))
 
 
+def cycle_ends(bench: Bench, gait: str, steps: int | None = None) -> int:
+    """Number of instants at which gait cycles of two steps begin or end."""
+    return len(cycle_times(bench.account(gait, steps)))
+
+
 def swing_height(bench: Bench, gait: str, foot: str, steps: int | None = None) -> float:
     """How high a foot is lifted [m]."""
     return float(_path(bench.account(gait, steps), foot)[:, 2].max())
+
+
+def largest_effort(bench: Bench, gait: str, steps: int | None = None) -> float:
+    """Largest torque [N m] of a joint along the planned walk, the load shared out among soles' corners."""
+    forces = forces_of(bench.account(gait, steps), None)
+    return float(np.abs(forces.forces.efforts).max())
 
 
 def balance_number(

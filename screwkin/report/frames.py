@@ -10,6 +10,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, pose_from_array, unstack
 from screwkin.analysis.account import Account
 from screwkin.dynamics.support import convex_hull
+from screwkin.errors import InputError
 from screwkin.gait.ground import ground_of
 from screwkin.kinematics.positions import link_displacements
 from screwkin.model.robot import Robot
@@ -33,9 +34,23 @@ def frame_times(account: Account) -> Array:
     return np.linspace(boundaries[begin], boundaries[begin + 2], count, endpoint=False)
 
 
-def frames_of_run(account: Account, run: Run) -> Figure:
-    """Frames of the simulated walk; of a run that ended early, from its beginning to its end."""
-    wanted = frame_times(account)
+def cycle_times(account: Account) -> Array:
+    """Times [s] at which gait cycles of two steps begin, and the last one ends."""
+    boundaries = account.boundaries
+    if len(boundaries) < 3:
+        raise InputError("a walk without two steps has no gait cycle")
+    return np.array(boundaries[::2])
+
+
+def frames_of_run(account: Account, run: Run, times: Array | None = None) -> Figure:
+    """Frames of the simulated walk; of a run that ended early, from its beginning to its end.
+
+    Args:
+        account: of the walk.
+        run: its simulation.
+        times: of the frames [s]; default: see ``frame_times``.
+    """
+    wanted = frame_times(account) if times is None else times
     if run.time[-1] < wanted[-1]:
         wanted = np.linspace(account.trajectory.time[0], run.time[-1], len(wanted))
     rows = np.clip(np.searchsorted(run.time, wanted - 1e-9), 0, len(run.time) - 1)
@@ -47,8 +62,11 @@ def frames_of_run(account: Account, run: Run) -> Figure:
         Camera(),
         ground_of(account.trajectory),
     )
-    figure, axes = new_figure(4.9, ROWS, COLUMNS, squeeze=False)
-    for one, time, shot in zip(axes.flat, run.time[rows], shots, strict=True):
+    down = 1 if len(wanted) <= COLUMNS + 1 else -(-len(wanted) // COLUMNS)
+    figure, axes = new_figure(2.45 * down, down, -(-len(wanted) // down), squeeze=False)
+    for one in axes.flat[len(wanted) :]:
+        one.set_axis_off()
+    for one, time, shot in zip(axes.flat, run.time[rows], shots, strict=False):
         one.set_axis_off()
         one.imshow(shot)
         one.set_title(f"{time:.2f} s", fontsize=8.5, pad=3)

@@ -114,6 +114,34 @@ def slip(run: Run, trajectory: Trajectory, legs: tuple[str, ...]) -> Slip:
     return Slip(largest, total, turned)
 
 
+def landings(trajectory: Trajectory) -> Array:
+    """Times (m,) [s] at which a foot that swings is planned to stand again, in their order."""
+    lands = trajectory.contact[1:] & ~trajectory.contact[:-1]
+    return np.asarray(trajectory.time[1:][lands.any(axis=1)])
+
+
+def landing_leads(run: Run, trajectory: Trajectory, legs: tuple[str, ...]) -> Array:
+    """By how much (m,) every swinging foot touches the floor before it is planned to stand [s], up to a fall.
+
+    It touches where the floor carries a twentieth of the weight by it, in the second half of its swing or as
+    long after it; ``legs`` names the run's feet.
+    """
+    before = _before_fall(run)
+    time, force = run.time[before] - run.dt, run.foot_force[before, :, 2]
+    touches = force > 0.05 * np.median(force.sum(axis=1))
+    leads = []
+    for i, foot in enumerate(legs):
+        for first, last in _stretches(~trajectory.contact[:, trajectory.feet.index(foot)]):
+            if first == 0 or last == trajectory.samples:
+                continue
+            lift, land = trajectory.time[first - 1], trajectory.time[last]
+            half = (land - lift) / 2.0
+            rows = touches[:, i] & (time >= land - half) & (time <= land + half)
+            if rows.any():
+                leads.append(land - time[rows.argmax()])
+    return np.array(leads)
+
+
 def torque_use(run: Run, robot: Robot, window: float = WINDOW) -> Array:
     """Share (n,) of every motor's torque limit: the largest window mean of its torque.
 

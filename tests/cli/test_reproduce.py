@@ -41,9 +41,21 @@ def test_json_holds_item_paper_ours_and_note_of_every_row(cli, paper, tmp_path):
 def test_the_text_sets_both_values_side_by_side_and_sums_up(cli, paper, tmp_path):
     called = cli("reproduce", paper, "-o", "out", "--no-plots")
     assert called.code == 0
-    assert "robot [kg]  1.7    1.7   same" in called.out
+    assert "robot [kg]  1.7    1.7   same  printed  1.7\n" in called.out
     assert "1 rows: 1 of 1 printed numbers come out" in called.out
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["rows.json"]
+
+
+def test_the_text_has_the_kind_of_every_value_and_the_beginning_of_its_quotation(cli, paper, tmp_path):
+    words = "mass of the whole robot by the authors' own scales"
+    row = (
+        '{ item = "robot", measure = "mass", paper = 1.7, line = 1, quote = "1.7 QUOTE", kind = "damaged" }, '
+    )
+    more = f'row = [{row.replace("QUOTE", words)}{{ item = "again", measure = "mass" }}, '
+    paper.write_text(ONE.replace("row = [", more), encoding="utf-8")
+    out = cli("reproduce", paper, "-o", "out", "--no-plots").out
+    assert "damaged     1.7 mass of the whole robot by the…\n" in out
+    assert "ours alone\n" in out
 
 
 def test_the_page_names_the_number_of_runs_that_was_asked_for(cli, refused, paper, tmp_path):

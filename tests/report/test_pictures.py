@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from screwkin.errors import InputError
 from screwkin.report import balance, frames, motion, simulation
 from screwkin.report.pictures import save_pictures
 from screwkin.report.style import save_figure, spans, styled
@@ -163,6 +164,18 @@ def test_frames_are_taken_over_one_cycle_in_the_middle(account):
         meta = {**account.trajectory.meta, "boundaries": boundaries}
         other = replace(account, trajectory=replace(account.trajectory, meta=meta))
         assert frames.frame_times(other)[0] == start
+
+
+def test_gait_cycles_begin_and_end_at_every_other_step(account):
+    from dataclasses import replace
+
+    def at(boundaries):
+        meta = {**account.trajectory.meta, "boundaries": boundaries}
+        return replace(account, trajectory=replace(account.trajectory, meta=meta))
+
+    assert frames.cycle_times(at([0, 1, 2, 3, 4, 5, 6])).tolist() == [0, 2, 4, 6]
+    with pytest.raises(InputError, match="no gait cycle"):
+        frames.cycle_times(at([0, 1]))
 
 
 def test_what_is_near_the_viewer_hides_what_is_far(account):

@@ -10,7 +10,7 @@ import pytest
 import screwkin as sk
 from screwkin.model.robot import Robot
 from screwkin.sim.kinematic import KinematicBackend
-from screwkin.sim.measure import slip, speed_use, torque_use, zmp_record
+from screwkin.sim.measure import landing_leads, landings, slip, speed_use, torque_use, zmp_record
 from screwkin.sim.run import Run, simulate
 from screwkin.trajectory import Trajectory
 
@@ -115,3 +115,29 @@ def test_torque_use_is_the_worst_mean_of_a_window_after_settling(run: Run, robot
 def test_speed_use_is_the_planned_peak(walk: Trajectory, robot: Robot) -> None:
     knee = robot.joint_names.index("right_knee")
     assert speed_use(walk, robot)[knee] == pytest.approx(np.abs(walk.qd[:, knee]).max() / 6.0)
+
+
+@pytest.mark.parametrize("early", [0.06, 0.0, -0.04])
+def test_feet_that_touch_early_or_late_are_timed_against_their_planned_landings(
+    run: Run, walk: Trajectory, early: float
+) -> None:
+    """Every foot is loaded while the plan has it standing, and from so much before its landing on."""
+    time = run.time - run.dt
+    loaded = np.zeros((len(time), 2))
+    for i, foot in enumerate(LEGS):
+        stands = walk.contact[:, walk.feet.index(foot)]
+        loaded[:, i] = np.interp(time + early, walk.time, stands.astype(float)) > 1 - 1e-6
+    force = np.zeros((len(time), 2, 3))
+    force[..., 2] = 10.0 * loaded
+    leads = landing_leads(replace(run, foot_force=force), walk, LEGS)
+    assert len(leads) == len(landings(walk)) > 1
+    np.testing.assert_allclose(leads, early, atol=run.dt + 1e-9)
+    at = np.searchsorted(walk.time, landings(walk))
+    assert (walk.contact[at].sum(axis=1) > walk.contact[at - 1].sum(axis=1)).all()
+
+
+def test_no_foot_lands_that_touches_nothing_or_fell_before(run: Run, walk: Trajectory) -> None:
+    nothing = replace(run, foot_force=np.zeros((len(run.time), 2, 3)))
+    assert landing_leads(nothing, walk, LEGS).size == 0
+    touching = replace(run, foot_force=np.ones((len(run.time), 2, 3)), fallen_at=float(walk.time[3]))
+    assert landing_leads(touching, walk, LEGS).size == 0
