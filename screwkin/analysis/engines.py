@@ -23,6 +23,7 @@ from screwkin.sim.mujoco import MuJoCoBackend, MuJoCoPhysics
 from screwkin.sim.perturbation import NONE, Perturbation
 from screwkin.sim.perturbed import perturbed_ground, perturbed_robot, perturbed_servos
 from screwkin.sim.pybullet import Physics, PyBulletBackend
+from screwkin.sim.sweeps import sweeps
 from screwkin.trajectory import Trajectory
 
 Engine = Literal["auto", "pybullet", "mujoco", "kinematic"]
@@ -210,7 +211,8 @@ def opened(
     dt = STEP if springs is not None else None
     physics: Physics | MuJoCoPhysics
     if engine == "pybullet":
-        physics = _refined(Physics(sole_stiffness=soles), dt, finer, perturbation)
+        rigid = Physics(sole_stiffness=soles, iterations=sweeps(robot))
+        physics = _refined(rigid, dt, finer, perturbation)
     elif soles is not None:
         raise InputError("engine mujoco has no elastic soles; use pybullet")
     else:

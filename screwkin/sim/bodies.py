@@ -9,7 +9,7 @@ a body; it gets a mass and an inertia, since no engine divides by nothing.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +17,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import Pose, Vector, as_array
 from screwkin.errors import InputError
+from screwkin.model.inertias import impossible, nearest_body
 from screwkin.model.robot import Joint, Link, Robot
 
 LEAST = 1e-12
@@ -117,6 +118,27 @@ def check_feet(robot: Robot, soles: bool = False) -> None:
             f"robot {robot.name}: {names} has {has}, so it would sink into the floor. "
             f"{give} whose bottom is the sole."
         )
+
+
+def solid(robot: Robot) -> Robot:
+    """The robot with links of some mass, and inertias that bodies have: PyBullet takes others for none.
+
+    Args:
+        robot: of numbers.
+    """
+    robot = robot.with_inertia_floor()
+    if not any(impossible(link.inertia) for link in robot.links):
+        return robot
+    return replace(robot, links=tuple(_as_body(link) for link in robot.links))
+
+
+def _as_body(link: Link) -> Link:
+    """The link with the nearest inertia that a body has, and by a millionth of it more about every axis."""
+    if not impossible(link.inertia):
+        return link
+    i = nearest_body(link.inertia)
+    more = 1e-6 * max(i.xx, i.yy, i.zz)
+    return replace(link, inertia=replace(i, xx=i.xx + more, yy=i.yy + more, zz=i.zz + more))
 
 
 def _is_bracket(robot: Robot, name: str) -> bool:

@@ -28,7 +28,7 @@ from screwkin.model.robot import Limb, Robot
 from screwkin.model.state import State
 from screwkin.model.urdf import urdf_frames, urdf_of_bodies
 from screwkin.sim.backend import Command, Contact, Observation, moment_about_origin
-from screwkin.sim.bodies import check_feet
+from screwkin.sim.bodies import check_feet, solid
 from screwkin.sim.camera import Camera
 from screwkin.sim.couplings import couple_in_pybullet
 from screwkin.sim.drive import UNLIMITED, RigidServos, Servos, motored
@@ -127,7 +127,7 @@ class PyBulletBackend:
         self._motored = motored(robot)
         rotors = self._servos.rotor_inertia * self._motored
         steadied = not self._servos.relative_rotors
-        opened = replace(robot.with_inertia_floor(), closures=())
+        opened = replace(solid(robot), closures=())
         urdf = urdf_of_bodies(with_rotors(opened, rotors, steadied))
         self._p = _imported_pybullet()
         self._client = _connected(self._p, gui)
