@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -86,7 +86,8 @@ def refuse_unreachable(
         solution.raise_on_failure(robot, plan.time)
     except (UnreachableError, LimitError) as error:
         limb, sample = robot.limb(error.limb), error.sample
-        missing = _missing_freedom(robot, limb, targets[limb.tip][sample], solution, sample)
+        target = targets[limb.tip][sample]
+        missing = _missing_freedom(robot, limb, target, solution, sample, free.get(limb.tip, ()))
         when = f"{limb.name}, sample {sample} (t = {float(plan.time[sample]):.3f} s)"
         if missing:
             raise UnreachableError(f"{when}: {missing}", limb.name, sample) from None
@@ -162,8 +163,13 @@ def _refuse_other_branch(
     )
 
 
-def _missing_freedom(robot: Robot, limb: Limb, target: Array, solution: PoseSolution, sample: int) -> str:
-    """What no joint of a limb does although the target asks for it; empty if that is not the reason."""
+def _missing_freedom(
+    robot: Robot, limb: Limb, target: Array, solution: PoseSolution, sample: int, follow: Sequence[str]
+) -> str:
+    """What no joint of a limb does although the target asks for it; empty if that is not the reason.
+
+    Rotations of the tip that ``follow`` are not asked for.
+    """
     path = robot.path_to(limb.link)
     if target.shape != (4, 4):
         return ""
@@ -174,6 +180,8 @@ def _missing_freedom(robot: Robot, limb: Limb, target: Array, solution: PoseSolu
     axes = np.kron(np.eye(2), as_array(waist.R).astype(float).T)
     weight = np.repeat([1.0, 1 / length], 3)
     columns = [as_array(at(tip.p, column)).astype(float) for column in chain_jacobian(screws, home)]
+    turned = as_array(tip.R).astype(float)
+    columns += [np.append(turned[:, "xyz".index(name[1])], np.zeros(3)) for name in follow]
     J = weight[:, None] * (axes @ np.stack(columns, axis=1))
     U, values, _ = np.linalg.svd(J)
     free = U[:, int((values > _MISSING * values[0]).sum()) :]
