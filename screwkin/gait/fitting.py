@@ -1,8 +1,11 @@
 """A gait that fits a robot: how large, quick and bent its steps may be by limits, speeds and torques.
 
-The search goes from large, quick steps on bent legs to small, slow ones on straight legs; legs without a roll
-axis at the ankle are tried last with a waist that leans (``gait.steering``), in quicker steps. Many gaits are
-tried coarsely in one batch; the first promising ones are planned in full and judged by the model alone.
+The search goes from large, quick steps on bent legs to small, slow ones on straight legs; legs without a
+roll axis at the ankle are tried last with a waist that leans (``gait.steering``), in quicker steps. What is
+weak is spared then, in this order: ankles, by a ZMP that stays near them; hips that turn in little, by a ZMP
+on the inner half of the sole; hips that cannot carry the waist beside them, by a waist that leans over them;
+slow joints, by steps so slow that the weight is shifted while both feet stand. Many gaits are tried coarsely
+in one batch; the first promising ones are planned in full and judged by the model alone.
 """
 
 from __future__ import annotations
@@ -43,6 +46,12 @@ BACK = 0.3
 """How far ahead of ankles that are too weak for the middle of the sole the ZMP goes, by that."""
 QUICK = (2.5, 2.0)
 """Periods of steps that need less sway, where joints of the hips or ankles cannot turn far enough for it."""
+INWARD = 0.5
+"""How far from the middle of the sole to its inner edge the ZMP goes, where hips turn in too little."""
+SLOW = (8.0, 14.0)
+"""Periods of steps in which the weight is shifted slowly, for joints that are slow or weak."""
+SHIFTED = 0.5
+"""Share of such a step in which both feet stand: so long the CoM takes from one to the other."""
 USE = 0.9
 """Share of a joint's speed and torque that a gait may take."""
 _STEPS = 3
@@ -83,15 +92,17 @@ def fitting_gait(robot: Robot) -> Gait:
     """
     expect(robot, Robot, "robot", 'load_robot("NAME")')
     base, tried = fitted(load_gait("auto"), robot), list[_Judged]()
-    for paced in _paces(robot, base):
-        for gait in _promising(robot, paced):
-            tried.append(_judged(robot, gait))
+    for paces in (_paces(robot, base), _sparing(base)):
+        begun = len(tried)
+        for paced in paces:
+            for gait in _promising(robot, paced):
+                tried.append(_judged(robot, gait))
+                if not tried[-1].reasons:
+                    return gait
+        for judged in [one for one in tried[begun:] if one.weak]:
+            tried.append(_judged(robot, judged.gait.replace(ahead=BACK)))
             if not tried[-1].reasons:
-                return gait
-    for judged in [one for one in tried if one.weak]:
-        again = _judged(robot, judged.gait.replace(ahead=BACK))
-        if not again.reasons:
-            return again.gait
+                return tried[-1].gait
     raise NoSolutionError(_refusal(robot, base, tried))
 
 
@@ -105,6 +116,18 @@ def _paces(robot: Robot, base: Gait) -> Iterator[Gait]:
     rolls = any("rx" in rotations and "ry" not in rotations for rotations in free.values())
     lateral, periods = ("lean", LEANING) if rolls else ("shift", QUICK)
     yield from (base.replace(lateral=lateral, period=p, stand=START / p) for p in periods)
+
+
+def _sparing(base: Gait) -> Iterator[Gait]:
+    """The gait with less sway, in quick steps; with a waist that leans over the foot; and in slow steps.
+
+    A hip carries all but its leg beside it, by the distance that its CoM keeps from the hip: only a lean
+    makes that shorter. The CoM of a slow step goes from foot to foot as fast as the ZMP does, or faster than
+    joints can if it is left to fall over: so long both feet stand.
+    """
+    yield from (base.replace(inward=INWARD, period=p, stand=START / p) for p in QUICK)
+    yield from (base.replace(lateral="lean", period=p, stand=START / p) for p in LEANING)
+    yield from (base.replace(period=period, dsp=SHIFTED) for period in SLOW)
 
 
 def _promising(robot: Robot, base: Gait) -> list[Gait]:

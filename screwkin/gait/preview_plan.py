@@ -157,7 +157,8 @@ def zmp_reference(gait: Gait, stance: Stance, holds: tuple[Foothold, ...], steps
     about the middle and along the foot's x axis. Before the first swing of a waist that leans it goes to the
     foot that swings, and after the last one to the foot that swung, for half a phase: so the first lean is
     no larger than the next ones. The gait's number ``ahead`` (default 1) times as far ahead of the tips as
-    the middle, which lie below the ankles: these then bear less torque.
+    the middle, which lie below the ankles: these then bear less torque. Its number ``inward`` (default 0) of
+    the way from the middle to the edge at the other foot: the CoM then sways less.
 
     Args:
         gait: of kind ``preview`` or ``footsteps``.
@@ -166,7 +167,7 @@ def zmp_reference(gait: Gait, stance: Stance, holds: tuple[Foothold, ...], steps
         steps: number of swings.
         time: (T,) [s].
     """
-    middle = partial(_middle, stance, gait.numbers.get("ahead", 1.0))
+    middle = partial(_middle, stance, gait.numbers.get("ahead", 1.0), gait.numbers.get("inward", 0.0))
     begins, enter = [0.0], [0.5 * (middle(holds[0]) + middle(holds[1]))]
     leave, leans = enter.copy(), gait.lateral == "lean"
     stand = {hold.foot: hold for hold in holds[:2]}
@@ -200,14 +201,20 @@ def zmp_reference(gait: Gait, stance: Stance, holds: tuple[Foothold, ...], steps
 
 
 def _middle(
-    stance: Stance, ahead: float, hold: Foothold, towards: Foothold | None = None, by: float = 0.0
+    stance: Stance,
+    ahead: float,
+    inward: float,
+    hold: Foothold,
+    towards: Foothold | None = None,
+    by: float = 0.0,
 ) -> Array:
     """The middle of a sole on its foothold, or ``by`` along its x axis towards another [m].
 
-    It is ``ahead`` times as far ahead of the tip.
+    It is ``ahead`` times as far ahead of the tip, and ``inward`` of the way to the edge at the other foot.
     """
-    outlines = {foot.name: foot.sole for foot in stance.feet}
-    x, y = np.mean(outlines[hold.foot], axis=0) * (ahead, 1.0)
+    side, sole = next((foot.side, np.array(foot.sole)) for foot in stance.feet if foot.name == hold.foot)
+    x, y = np.mean(sole, axis=0) * (ahead, 1.0)
+    y += inward * (side * np.min(side * sole[:, 1]) - y)
     c, s = np.cos(hold.yaw), np.sin(hold.yaw)
     if towards is not None:
         x += float(np.clip(c * (towards.x - hold.x) + s * (towards.y - hold.y), -by, by))

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import screwkin as sk
 from screwkin.anatomy.humanoid import humanoid
-from screwkin.errors import GaitError
+from screwkin.errors import GaitError, NoSolutionError
+from screwkin.gait.feed_forward import walking_torques
 from screwkin.gait.footsteps import footholds
 from screwkin.gait.lengths import fitted
 from screwkin.gait.plan import plan
+from screwkin.gait.preview import follow_reference, preview_gains
 from screwkin.gait.preview_plan import zmp_reference
 from screwkin.gait.stance import stance_of
 from screwkin.gait.steering import Steering
@@ -99,6 +103,61 @@ def test_the_zmp_may_stay_below_the_ankles(robot: sk.Robot, gait: sk.Gait) -> No
     middle = np.mean([foot.sole for foot in stance.feet], axis=(0, 1))[0]
     whole, part = (zmp_reference(gait.replace(ahead=share), stance, holds, 3, time) for share in (1.0, 0.3))
     np.testing.assert_allclose(whole - part, np.tile([0.7 * middle, 0], (300, 1)), atol=1e-12)
+
+
+def test_the_zmp_may_go_to_the_inner_half_of_the_soles(robot: sk.Robot, gait: sk.Gait) -> None:
+    gait, stance, time = gait.replace(lateral="shift"), stance_of(robot), np.arange(300) / 50
+    holds = footholds(gait, stance, 3)
+    middle, inner = (
+        zmp_reference(gait.replace(inward=share), stance, holds, 3, time) for share in (0.0, 0.5)
+    )
+    corners = np.array(stance.foot(1).sole)[:, 1]
+    share = 0.5 * (corners.mean() - corners.min()) / (stance.foot_y + corners.mean())
+    np.testing.assert_allclose(inner, middle * (1, 1 - share), atol=1e-12)
+    np.testing.assert_array_equal(middle, zmp_reference(gait.replace(inward=0), stance, holds, 3, time))
+
+
+def test_a_slow_step_shifts_the_weight_slowly_only_if_both_feet_stand_for_long(
+    robot: sk.Robot, gait: sk.Gait
+) -> None:
+    """Twice the time halves the speed of the CoM; a short shift lets it fall over as fast as a pendulum."""
+    gait, stance = gait.replace(lateral="shift", stand=1), stance_of(robot)
+    holds, speed = footholds(gait, stance, 3), {}
+    for dsp in (0.2, 0.5):
+        for period in (10, 20):
+            paced = gait.replace(dsp=dsp, period=period)
+            time = np.arange(round(5 * paced.Tc * 50)) / 50
+            gains = preview_gains(0.02, 0.6, paced.numbers["horizon"])
+            cart = follow_reference(gains, zmp_reference(paced, stance, holds, 3, time))
+            speed[dsp, period] = np.abs(cart.velocity[:, 1]).max()
+    assert speed[0.5, 20] == pytest.approx(0.5 * speed[0.5, 10], rel=0.1)
+    assert speed[0.2, 20] > 1.5 * speed[0.5, 20]
+
+
+def test_a_waist_that_leans_takes_load_off_the_hips() -> None:
+    bioloid = sk.load_robot("bioloid")
+    gait = fitted(sk.load_gait("auto"), bioloid).replace(**QUICK)
+    rolls = [i for i, joint in enumerate(bioloid.joints) if "hip_roll" in joint.name]
+    assert len(rolls) == 2
+    most = {
+        key: np.abs(walking_torques(bioloid, sk.walk(bioloid, gait.replace(lateral=key), 1)))[:, rolls].max()
+        for key in ("shift", "lean")
+    }
+    assert most["lean"] < 0.9 * most["shift"]
+
+
+def test_a_leg_whose_sole_may_lean_is_out_of_reach_by_its_limits_not_for_want_of_a_joint(
+    robot: sk.Robot, gait: sk.Gait
+) -> None:
+    rolls = {robot.path_to(limb.link)[1] for limb in robot.limbs if limb.kind == "leg"}
+    joints = (
+        replace(joint, lower=-0.02, upper=0.02) if i in rolls else joint
+        for i, joint in enumerate(robot.joints)
+    )
+    stiff = replace(robot, joints=tuple(joints))
+    with pytest.raises(NoSolutionError, match=r"at -?1\.\d deg, limits -1\.1 to 1\.1 deg") as caught:
+        sk.walk(stiff, gait, steps=1)
+    assert "no joint" not in str(caught.value)
 
 
 def test_a_stand_of_less_than_a_phase_is_refused(robot: sk.Robot, gait: sk.Gait) -> None:
