@@ -25,6 +25,7 @@ from screwkin.sim.compliant import STEP, Compliance, SpringServos
 from screwkin.sim.measure import ZmpRecord, landing_leads, zmp_record
 from screwkin.sim.pybullet import Physics, PyBulletBackend
 from screwkin.sim.run import Schedule, simulate
+from screwkin.sim.sweeps import sweeps
 from screwkin.trajectory import Trajectory
 
 Treatment = Literal["none", "swing", "joint", "dynamic"]
@@ -189,6 +190,7 @@ def _trial(
     """One run from settling to the end, or to its fall."""
     physics = Physics(
         dt=dt,
+        iterations=sweeps(robot),
         friction=friction,
         sole_stiffness=conditions.sole_stiffness,
         sole_damping=conditions.sole_damping,
