@@ -10,7 +10,11 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import as_array
+from screwkin.dynamics.terrain import Terrain
 from screwkin.gait.ground import ground_of
+from screwkin.kinematics.mass import mass_center
+from screwkin.kinematics.positions import link_displacements
 from screwkin.mechanism.holds import on_floor
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
@@ -105,7 +109,8 @@ def simulate(
     planned = trajectory.base_sampled(times)
     qd = np.diff(q, axis=0) / dt
     backend.reset(State(planned[0], q[0] if start is None else start))
-    low = rule.fallen_height * terrain.above_plane(planned[:, :3, 3])
+    watched = _watched(robot, State(planned[0], q[0]), terrain)
+    low = rule.fallen_height * terrain.above_plane(_carried(planned, watched))
     upright = math.cos(rule.fallen_tilt)
     seen: list[Observation] = []
     fallen_at: float | None = None
@@ -118,7 +123,7 @@ def simulate(
             progress((k + 1) / count)
         if fallen_at is None:
             T = seen[-1].T_world_base
-            if T[2, 2] < upright or terrain.above_plane(T[:3, 3]) < low[k + 1]:
+            if T[2, 2] < upright or terrain.above_plane(_carried(T, watched)) < low[k + 1]:
                 fallen_at = now
         if fallen_at is not None and now > fallen_at + rule.aftermath - dt / 2:
             break
@@ -134,6 +139,22 @@ def simulate(
         fallen_at=fallen_at,
         **_columns(robot, seen),
     )
+
+
+def _watched(robot: Robot, state: State, terrain: Terrain) -> Array:
+    """The point of the base whose height says whether the robot has fallen, in base axes (3,).
+
+    The base's origin; where that lies below half the CoM's height, as on the floor between the feet, the
+    place of the CoM in the given state.
+    """
+    com = as_array(mass_center(robot, link_displacements(robot, state.q.tolist()))).astype(float)
+    origin, above = terrain.above_plane(_carried(state.T_world_base, np.stack([0 * com, com])))
+    return 0 * com if origin > 0.5 * above else com
+
+
+def _carried(T: Array, points: Array) -> Array:
+    """World positions of points (..., 3) of base axes under poses (..., 4, 4)."""
+    return np.asarray((T[..., :3, :3] @ points[..., None])[..., 0] + T[..., :3, 3])
 
 
 def _columns(robot: Robot, seen: list[Observation]) -> dict[str, Any]:

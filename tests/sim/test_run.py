@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
 
 import screwkin as sk
+from screwkin.algebra.se3 import Vector
 from screwkin.model.robot import Robot
 from screwkin.sim.backend import Command, Contact, Observation
 from screwkin.sim.kinematic import KinematicBackend
@@ -137,3 +138,17 @@ def test_a_push_reaches_the_backend_in_the_steps_of_its_time(robot: Robot, walk:
     assert pushed == np.flatnonzero((run.time > 0.3001) & (run.time < 0.3501)).tolist()
     impulse = sum((backend.commands[k].force for k in pushed), np.zeros(3)) * backend.dt
     np.testing.assert_allclose(impulse, by.push)
+
+
+def test_a_base_whose_origin_lies_below_the_soles_has_not_fallen(robot: Robot, walk: Trajectory) -> None:
+    """It may lie anywhere: a hundred millimetres below the floor it is no sign of a fall."""
+    up = Vector(0.0, 0.0, 0.4)
+    links = (replace(link, com=link.com + up) for link in robot.links)
+    robot, low = replace(robot, links=tuple(links)), walk.T_world_base[0].copy()
+    low[2, 3] = -0.1
+    lying = replace(walk, T_world_base=walk.T_world_base + (low - walk.T_world_base[0]))
+    sunk = low.copy()
+    sunk[2, 3] -= 0.2
+    for pose, falls in ((low, False), (sunk, True)):
+        backend = Scripted([pose], len(robot.joints))
+        assert (simulate(robot, lying, backend).fallen_at is not None) == falls
