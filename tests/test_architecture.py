@@ -30,7 +30,7 @@ FLOORS: dict[str, int] = {
     "gait": 6, "trajectory": 6, "anatomy": 6,
     "sim": 7, "servo": 7,
     "analysis": 8,
-    "report": 9, "papers": 9, "export": 9,
+    "report": 9, "papers": 9, "export": 9, "viewer": 9,
     "cli": 10, "__main__": 10, "": 10,
 }  # fmt: skip
 DRIVERS = {
@@ -41,11 +41,12 @@ DRIVERS = {
     "distributed": ("screwkin.analysis.cluster",),
     "trimesh": ("screwkin.model.meshes",),
     "collada": ("screwkin.model.meshes",),
+    "viser": ("screwkin.viewer.server",),
     "serial": ("screwkin.servo.bus",),
     "dynamixel_sdk": ("screwkin.servo.bus",),
 }
 LAZY = (*DRIVERS, "sympy")
-SLOW_TO_START = ("jax", "scipy", "matplotlib", "sympy", "pybullet", "serial", "dynamixel_sdk")
+SLOW_TO_START = ("jax", "scipy", "matplotlib", "sympy", "pybullet", "serial", "dynamixel_sdk", "viser")
 
 
 @dataclass(frozen=True)

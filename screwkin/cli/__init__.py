@@ -31,6 +31,7 @@ VERBS = {
     "zmp": "Recompute CoM, ZMP, margins and spikes of a trajectory.",
     "validate": "Simulate a trajectory and give a verdict.",
     "sweep": "Simulate a walk under many settings and seeds, and count the falls.",
+    "view": "A robot or a motion in the browser: joints to drag, gaits to tune, time to scrub.",
     "workspace": "Where a foot can go, held level, and which joint limit cuts there.",
     "stiffness": "Deflection of a foot on elastic joints, all over its workspace.",
     "codegen": "A robot's formulas as C, for other programs and microcontrollers.",

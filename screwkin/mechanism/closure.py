@@ -180,13 +180,23 @@ def close_loops(mechanism: Mechanism, guess: State, imposed: Mapping[str, Array]
     )
 
 
-def nearest_closed(robot: Robot, q: Array) -> Array:
+def nearest_closed(robot: Robot, q: Array, held: Sequence[str] = ()) -> Array:
     """Joint positions (n,) near q at which every closure of a table closes: for a posture written by eye.
+
+    Args:
+        robot: of n joints.
+        q: (n,) [rad or m].
+        held: names of joints that stay where they are.
 
     Raises:
         NoSolutionError: Newton's method finds none from there; the message names the residual.
+        UnknownNameError: no such joint.
     """
     mechanism = unchosen(replace(robot, limbs=(), soles=()))
+    if held:
+        primary = tuple(one_of("joint", name, robot.joint_names) for name in held)
+        others = tuple(name for name in mechanism.secondary if name not in primary)
+        mechanism = replace(mechanism, primary=primary, secondary=others)
     solution = close_loops(mechanism, State(np.eye(4), q), {})
     if solution.residual > CLOSED:
         raise NoSolutionError(

@@ -8,9 +8,8 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.analysis.account import Account
-from screwkin.dynamics.support import Spike, convex_hull
-from screwkin.gait.balance import soles_on_floor
-from screwkin.gait.ground import ground_of
+from screwkin.analysis.placed_soles import placed_soles, support_polygons
+from screwkin.dynamics.support import Spike
 from screwkin.mechanism.singularity import NEAR
 from screwkin.report.style import (
     GCOM,
@@ -32,28 +31,6 @@ from screwkin.report.style import (
 
 _AXES = ("x", "y")
 _APART = 0.018  # of the duration: labels of spikes nearer than that would overlap
-
-
-def placed_soles(account: Account) -> Array:
-    """Corners (T, feet, corners, 2) of soles, carried along the ground's force onto z = 0 [m]."""
-    trajectory = account.trajectory
-    terrain, wrench = ground_of(trajectory), account.balance.wrench
-    return soles_on_floor(account.robot, trajectory.feet, trajectory.T_world_tip, terrain, wrench)
-
-
-def support_polygons(account: Account) -> list[tuple[int, int, Array]]:
-    """First and last sample of every phase of support, and the corners (k, 2) of its polygon [m]."""
-    trajectory = account.trajectory
-    soles = placed_soles(account)
-    contact = trajectory.contact
-    changed = np.flatnonzero((contact[1:] != contact[:-1]).any(axis=1)) + 1
-    starts = [0, *changed.tolist()]
-    ends = [*changed.tolist(), trajectory.samples]
-    return [
-        (begin, end - 1, convex_hull(soles[begin, contact[begin]].reshape(-1, 2)))
-        for begin, end in zip(starts, ends, strict=True)
-        if contact[begin].any()
-    ]
 
 
 def zmp_against_gcom(account: Account, axis: int) -> Figure:

@@ -19,6 +19,7 @@ from screwkin.report.style import Axes, Figure, joint_colours, new_figure
 from screwkin.sim.camera import Camera
 from screwkin.sim.render import pictures
 from screwkin.sim.run import Run
+from screwkin.viewer.scene import lines_of
 
 ROWS, COLUMNS = 2, 3
 GREY = "#8A8F98"
@@ -135,15 +136,5 @@ def _solids(robot: Robot) -> dict[str, list[Array]]:
         if link.shapes and link.name in shaped:
             solids[link.name] = [shaped[link.name]]
         else:
-            solids[link.name] = [box_points(box) for box in link.boxes] or _lines(robot, link.name)
+            solids[link.name] = [box_points(box) for box in link.boxes] or lines_of(robot, link.name)
     return solids
-
-
-def _lines(robot: Robot, name: str) -> list[Array]:
-    """Ends (2, 3) of the lines from a link's joint to the joints and tips that it carries."""
-    if name not in robot.joint_above:
-        return []
-    start = as_array(robot.tree[robot.joint_above[name]].screw.s0)
-    ends = [as_array(joint.screw.s0) for joint in robot.tree if joint.parent == name]
-    ends += [as_array(limb.frame.p) for limb in robot.limbs if limb.link == name]
-    return [np.stack([start, end]) for end in ends if np.linalg.norm(end - start) > 1e-6]

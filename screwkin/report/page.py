@@ -6,6 +6,7 @@ import base64
 from collections.abc import Iterable, Sequence
 from html import escape
 from importlib.resources import files
+from io import BytesIO
 from pathlib import Path
 from string import Template
 from typing import Any
@@ -21,6 +22,7 @@ from screwkin.model.records import CoupledJoint
 from screwkin.model.robot import Robot
 from screwkin.report.numbers import validation_numbers, walk_numbers
 from screwkin.report.pictures import Saved
+from screwkin.report.player import player_html
 
 _UNITS = dict.fromkeys(("stride", "side", "lift", "waist_height", "hand_drop", "spread"), "m") | {
     "Tc": "s per step",
@@ -29,6 +31,8 @@ _UNITS = dict.fromkeys(("stride", "side", "lift", "waist_height", "hand_drop", "
     "ramp": "steps",
     "rate": "Hz",
 }
+COLOURS = 160
+"""Of a picture in a page."""
 _KIND = {".png": "image/png", ".gif": "image/gif"}
 
 
@@ -47,7 +51,7 @@ def write_page(
         account: of the trajectory.
         pictures: as ``save_pictures`` wrote them; they are embedded.
         check: the verdict of a simulation.
-        film: an animated picture to embed.
+        film: an animated picture that lies beside the page; it is named, and not embedded.
         commands: command lines that produced it; default: the one recorded in the trajectory.
 
     Raises:
@@ -78,7 +82,10 @@ def _parts(
         "tone": tone,
         "verdict": escape(verdict),
         "remarks": _list(remarks),
-        "film": f'<img class="film" alt="The walk in simulation" src="{_embedded(film)}">' if film else "",
+        "player": player_html(account, check),
+        "film": f"<p>The film of the simulation lies beside this page: {escape(film.name)}.</p>"
+        if film
+        else "",
         "numbers": _numbers(account, check),
         "pictures": _pictures(pictures),
         "robot": escape(f"{robot.name}: {robot.description}. Mass {float(robot.mass):.4f} kg."),
@@ -144,8 +151,24 @@ def figure_html(path: Path, name: str, caption: str) -> str:
 
 
 def _embedded(path: Path) -> str:
-    data = base64.b64encode(path.read_bytes()).decode("ascii")
-    return f"data:{_KIND[path.suffix]};base64,{data}"
+    """A picture as the text of a reference; of drawings with a palette."""
+    data = _few_colours(path) if path.suffix == ".png" else path.read_bytes()
+    return f"data:{_KIND[path.suffix]};base64,{base64.b64encode(data).decode('ascii')}"
+
+
+def _few_colours(path: Path) -> bytes:
+    """A PNG picture with a palette, a third of its bytes; as it is where that is no smaller."""
+    from PIL import Image
+
+    data, small = path.read_bytes(), BytesIO()
+    try:
+        with Image.open(path) as picture:
+            picture.convert("RGB").quantize(
+                COLOURS, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE
+            ).save(small, "PNG", optimize=True)
+    except OSError:
+        return data
+    return min(data, small.getvalue(), key=len)
 
 
 def _mechanism(facts: Facts) -> str:

@@ -1,0 +1,108 @@
+"""The browser viewer itself: the only file that talks to viser.
+
+Browsers only write into a mailbox; one loop reads it, keeps the session, and draws. So nothing is shared
+between threads but that mailbox, and a slider dragged fast plans for its last value alone.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from contextlib import redirect_stdout
+from io import StringIO
+from typing import Any
+
+import numpy as np
+
+from screwkin.errors import InputError, needed_for
+from screwkin.viewer.panel import Mailbox, Panel
+from screwkin.viewer.session import Session, handled, later, planned
+from screwkin.viewer.stage import Stage
+
+HOST, PORT = "127.0.0.1", 8080
+PERIOD = 1 / 40
+"""Time between two pictures [s] while a motion plays."""
+
+
+def serve(
+    session: Session,
+    host: str = HOST,
+    port: int = PORT,
+    ready: Callable[[str], None] = lambda url: None,
+    going_on: Callable[[], bool] = lambda: True,
+) -> None:
+    """Show a session in browsers until it is interrupted.
+
+    A robot that walks and has no motion yet is shown first, and then its gait is planned.
+
+    Args:
+        session: to begin with.
+        host: address to listen at; ``0.0.0.0`` for all of the computer's.
+        port: to listen at; the next free one if it is taken.
+        ready: called with the address to open, once it answers.
+        going_on: asked before every picture.
+
+    Raises:
+        MissingDependencyError: viser is not installed. InputError: it cannot listen there.
+    """
+    with needed_for("The viewer"):
+        import viser
+    try:
+        with redirect_stdout(StringIO()):  # it prints its own table of addresses, to the place of ours
+            server = viser.ViserServer(host=host, port=port, verbose=False)
+    except OSError as error:
+        raise InputError(
+            f"cannot listen at {host}, port {port}: {error}; give another --host or --port"
+        ) from None
+    try:
+        _prepare(server, session)
+        mailbox = Mailbox()
+        stage, panel = Stage(server.scene, session), Panel(server.gui, session, mailbox)
+        stage.show(session)
+        ready(f"http://{'localhost' if host == '0.0.0.0' else host}:{server.get_port()}")
+        _run(server, session, stage, panel, mailbox, going_on)
+    finally:
+        server.stop()
+
+
+def _prepare(server: Any, session: Session) -> None:
+    """Floor, light and the place from which one looks first."""
+    from screwkin.viewer.scene import size_of
+
+    size = size_of(session.robot)
+    middle = session.T_world_base[:3, 3] * np.array([1.0, 1.0, 0.6])
+    server.gui.configure_theme(control_layout="floating", show_logo=False, show_share_button=False)
+    server.scene.set_up_direction("+z")
+    server.scene.configure_default_lights(cast_shadow=False)  # shadows cost most where no graphics card is
+    server.scene.configure_environment_map(None)
+    server.scene.add_light_ambient("/ambient", intensity=1.2)
+    middle = middle + size * np.array([0.25, 0.25, 0.0])  # the panel covers the right of the picture
+    server.initial_camera.position = tuple(middle + size * np.array([1.2, -1.4, 0.6]))
+    server.initial_camera.look_at = tuple(middle)
+
+
+def _run(
+    server: Any, session: Session, stage: Stage, panel: Panel, mailbox: Mailbox, going_on: Callable[[], bool]
+) -> None:
+    """Handle what is asked for, go on in time, draw; until interrupted."""
+    if session.track is None and session.gait is not None:
+        session = planned(session)
+    before = time.monotonic()
+    drawn: Session | None = None
+    while going_on():
+        now = time.monotonic()
+        asked = mailbox.taken()
+        for key, value in asked.items():
+            what, _, name = key.partition(" ")
+            if what == "mark":
+                stage.mark(name, bool(value))
+            elif what == "circuit":
+                stage.circuit(str(value))
+        session = handled(later(session, now - before), asked)
+        if session is not drawn or asked:
+            with server.atomic():
+                stage.show(session)
+            panel.show(session, now - before)
+            drawn = session
+        before = now
+        time.sleep(max(0.0, PERIOD - (time.monotonic() - now)))

@@ -1,0 +1,51 @@
+"""``view``: what it shows, what it refuses; the browser is tested in ``tests/viewer``."""
+
+import pytest
+
+import screwkin as sk
+import screwkin.cli.view as verb
+
+
+@pytest.fixture
+def shown(monkeypatch):
+    """The sessions that would be shown in a browser."""
+    sessions = []
+
+    def serve(session, host, port, ready):
+        sessions.append(session)
+        ready(f"http://{host}:{port}")
+
+    monkeypatch.setattr(verb, "serve", serve)
+    return sessions
+
+
+def test_a_robot_a_linkage_and_a_motion_are_shown(cli, shown, walked):
+    assert cli("view", "bioloid", "--json", "--port", 9000).data == {
+        "url": "http://127.0.0.1:9000",
+        "robot": "bioloid",
+    }
+    assert "Ctrl-C" in cli("view", "linkages/four-bar").out
+    assert cli("view", walked / "trajectory.npz").code == 0
+    robot, linkage, motion = shown
+    assert (robot.gait.name, robot.track) == ("walk", None)
+    assert (linkage.gait, linkage.track) == (None, None)
+    assert (motion.gait.name, motion.steps) == ("paper", 2)
+    assert motion.track.duration == pytest.approx(sk.load_trajectory(walked / "trajectory.npz").duration)
+
+
+def test_what_cannot_be_shown_is_refused(cli, refused, shown, walked, tmp_path):
+    assert "leave --gait out" in refused(cli("view", walked / "trajectory.npz", "--gait", "walk"), 2)
+    assert "ends in .gif" in refused(cli("view", "bioloid", "--record", "walk.mp4"), 2)
+    assert "no motion to film" in refused(cli("view", "linkages/four-bar", "--record", "a.gif"), 2)
+    assert "unknown robot" in refused(cli("view", "bioloidd"), 2)
+    assert shown == []
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interrupt_ends_it_with_130(cli, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(verb, "serve", interrupted)
+    called = cli("view", "linkages/four-bar")
+    assert (called.code, called.err) == (130, "interrupted\n")
