@@ -17,6 +17,7 @@ from screwkin.analysis.verdict import Criteria, verdict_of
 from screwkin.cli.output import drawn, plain, progress_bar, remark
 from screwkin.errors import UnknownNameError
 from screwkin.files import atomic_write
+from screwkin.report.names import FILM, PAGE, remove_reports
 from screwkin.report.page import write_page
 from screwkin.report.pictures import Saved, save_pictures
 from screwkin.sim.camera import Camera, save_gif
@@ -80,17 +81,18 @@ def simulate_to_files(account: Account, folder: Path, verdict: Path, wish: Wish)
             check_solver=wish.check_solver,
             perturbation=wish.perturbation,
         )
+    remove_reports(folder)
     with atomic_write(verdict) as file:
         data = verdict_of(account.robot, trajectory, check).to_dict()
         file.write(json.dumps(plain(data), indent=2, allow_nan=False) + "\n")
     film = None
     if camera is not None and check.pictures:
-        film = save_gif(folder / "walk.gif", check.pictures, trajectory.duration / (camera.pictures - 1))
+        film = save_gif(folder / FILM, check.pictures, trajectory.duration / (camera.pictures - 1))
     more = wish.more(check)
     if wish.plots:
         with progress_bar("pictures") as done:
             pictures = drawn(lambda: [*save_pictures(account, folder, check, done), *more()])
-        write_page(folder / "report.html", account, pictures, check, film, wish.commands)
+        write_page(folder / PAGE, account, pictures, check, film, wish.commands)
     return check
 
 

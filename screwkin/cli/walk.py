@@ -26,6 +26,7 @@ from screwkin.gait.walk import walk as walk_of
 from screwkin.gait.write import gait_toml
 from screwkin.model.robot import Robot, robot_text
 from screwkin.model.table import load_robot
+from screwkin.report.names import PAGE, remove_reports
 from screwkin.report.numbers import walk_data, walk_numbers
 
 
@@ -207,6 +208,7 @@ def _planned(robot: Robot, gait: Gait, steps: int, command: str) -> Account:
 
 
 def _save(account: Account, folder: Path) -> None:
+    remove_reports(folder)
     for ending in ("npz", "csv"):
         account.trajectory.save(folder / f"trajectory.{ending}")
 
@@ -218,7 +220,7 @@ def write_report(account: Account, folder: Path) -> Path:
 
     with progress_bar("pictures") as done:
         pictures = drawn(lambda: save_pictures(account, folder, progress=done))
-    return write_page(folder / "report.html", account, pictures)
+    return write_page(folder / PAGE, account, pictures)
 
 
 def _print_summary(account: Account, gait: Gait, folder: Path) -> None:

@@ -2,25 +2,59 @@
 
 from __future__ import annotations
 
-from screwkin.analysis.account import account_of, recorded_robot
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from screwkin.analysis.account import Account, account_of, recorded_robot
+from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, TrajectoryPath
-from screwkin.cli.output import aligned, print_json, remark
+from screwkin.cli.output import aligned, drawn, print_json, progress_bar, remark
+from screwkin.report.names import PAGE, remove_reports
 from screwkin.report.numbers import balance_data, balance_numbers
 from screwkin.trajectory import load_trajectory
 
 
-def zmp(trajectory: TrajectoryPath, as_json: AsJson = False) -> int:
+def zmp(
+    trajectory: TrajectoryPath,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="DIR", help="Draw it: pictures and report.html in this folder."
+        ),
+    ] = None,
+    as_json: AsJson = False,
+) -> int:
     """Recompute CoM, ZMP, margins and spikes from the joints' positions, rates and accelerations.
 
     Exit code 3 if the ZMP leaves the support polygon.
     """
     loaded = load_trajectory(trajectory)
     account = account_of(recorded_robot(loaded, str(trajectory)), loaded)
+    if output is not None:
+        with output_folder(output, "zmp", account.robot.name) as folder:
+            _draw(account, folder)
     if as_json:
-        print_json({"robot": account.robot.name, "samples": loaded.samples, **balance_data(account)})
+        places = {} if output is None else {"folder": str(output)}
+        data = {"robot": account.robot.name, "samples": loaded.samples, **balance_data(account)}
+        print_json({**data, **places})
     else:
         print(f"{trajectory}: {account.robot.name}, {loaded.samples} samples, {loaded.duration:.2f} s")
         print(aligned(balance_numbers(account), "  "))
         for warning in account.warnings:
             remark(f"warning: {warning}")
+        if output is not None:
+            print(f"files in {output}")
     return 3 if account.outside.any() else 0
+
+
+def _draw(account: Account, folder: Path) -> None:
+    """The pictures of the balance, and a page that plays the motion."""
+    from screwkin.report.page import write_page
+    from screwkin.report.pictures import save_balance_pictures
+
+    remove_reports(folder)
+    with progress_bar("pictures"):
+        pictures = drawn(lambda: save_balance_pictures(account, folder))
+    write_page(folder / PAGE, account, pictures)

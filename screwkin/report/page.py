@@ -31,8 +31,8 @@ _UNITS = dict.fromkeys(("stride", "side", "lift", "waist_height", "hand_drop", "
     "ramp": "steps",
     "rate": "Hz",
 }
-COLOURS = 160
-"""Of a picture in a page."""
+QUALITY = 82
+"""Of pictures in a page, of 100."""
 _KIND = {".png": "image/png", ".gif": "image/gif"}
 
 
@@ -151,24 +151,25 @@ def figure_html(path: Path, name: str, caption: str) -> str:
 
 
 def _embedded(path: Path) -> str:
-    """A picture as the text of a reference; of drawings with a palette."""
-    data = _few_colours(path) if path.suffix == ".png" else path.read_bytes()
-    return f"data:{_KIND[path.suffix]};base64,{base64.b64encode(data).decode('ascii')}"
+    """A picture as the text of a reference; of drawings as WebP, a third of the bytes."""
+    data, kind = path.read_bytes(), _KIND[path.suffix]
+    small = _webp(data) if path.suffix == ".png" else b""
+    if small and len(small) < len(data):
+        data, kind = small, "image/webp"
+    return f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}"
 
 
-def _few_colours(path: Path) -> bytes:
-    """A PNG picture with a palette, a third of its bytes; as it is where that is no smaller."""
+def _webp(data: bytes) -> bytes:
+    """A PNG picture as WebP; nothing where it is no picture, or Pillow was built without WebP."""
     from PIL import Image
 
-    data, small = path.read_bytes(), BytesIO()
+    small = BytesIO()
     try:
-        with Image.open(path) as picture:
-            picture.convert("RGB").quantize(
-                COLOURS, Image.Quantize.FASTOCTREE, dither=Image.Dither.NONE
-            ).save(small, "PNG", optimize=True)
-    except OSError:
-        return data
-    return min(data, small.getvalue(), key=len)
+        with Image.open(BytesIO(data)) as picture:
+            picture.convert("RGB").save(small, "WEBP", quality=QUALITY, method=2)
+    except (OSError, KeyError):
+        return b""
+    return small.getvalue()
 
 
 def _mechanism(facts: Facts) -> str:

@@ -47,6 +47,16 @@ def save_pictures(
     return _saved(plots, folder, progress)
 
 
+def save_balance_pictures(account: Account, folder: Path) -> list[Saved]:
+    """Draw and write what concerns the ZMP: its way seen from above, along both axes, and its margin.
+
+    Raises:
+        OutputError: a file cannot be written.
+    """
+    seen = [plot for plot in _motion(account) if plot.name == "top_view"]
+    return _saved([*seen, *_balance(account)], folder)
+
+
 def save_servo_pictures(account: Account, folder: Path, log: PlayLog) -> list[Saved]:
     """Draw and write what servos did, from the log of a play.
 

@@ -58,7 +58,7 @@
     scene.add(lamp);
     const world = new THREE.Group();
     scene.add(world);
-    const floor = new THREE.GridHelper(160 * tile, 160, 0xb9bec6, 0xd5d8dd);
+    const floor = new THREE.GridHelper(80 * tile, 80, 0x7d8592, 0xaab1bc);
     floor.rotation.x = Math.PI / 2;
     world.add(floor);
     const bodies = links.map(() => { const g = new THREE.Group(); g.matrixAutoUpdate = false; world.add(g); return g; });

@@ -41,6 +41,17 @@ def test_zmp_computes_anew_what_walk_predicted(cli, walked):
     assert "smallest margin of the ZMP" in cli("zmp", walked / "trajectory.npz").out
 
 
+def test_zmp_draws_where_it_is_asked_to_and_replaces_an_older_report(cli, walked, tmp_path):
+    (tmp_path / "drawn").mkdir()
+    for name in ("report.html", "servos.png"):
+        (tmp_path / "drawn" / name).write_text("of another walk")
+    told = cli("zmp", walked / "trajectory.npz", "-o", "drawn", "--json").data
+    assert told["folder"] == "drawn"
+    names = {path.name for path in (tmp_path / "drawn").iterdir()}
+    assert names == {"report.html", "top_view.png", "zmp_x.png", "zmp_y.png", "margin.png"}
+    assert "another walk" not in (tmp_path / "drawn" / "report.html").read_text(encoding="utf-8")
+
+
 def test_zmp_believes_the_joints_not_the_recorded_zmp(cli, changed):
     path = changed(zmp=np.zeros((201, 2)), margin=np.full(201, 9.0), com=np.zeros((201, 3)))
     told = cli("zmp", path)

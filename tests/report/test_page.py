@@ -4,11 +4,15 @@ import base64
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
+from io import BytesIO
 
+import numpy as np
 import pytest
+from PIL import Image
 
 import screwkin as sk
 from screwkin.errors import OutputError
+from screwkin.report.names import PICTURES, remove_reports
 from screwkin.report.page import write_page
 from screwkin.report.pictures import Saved, save_pictures
 
@@ -54,10 +58,15 @@ def test_everything_is_inside(account, pictures, tmp_path):
     assert len(read.references) == len(pictures)
     for picture, reference in zip(pictures, read.references, strict=True):
         kind, _, data = reference.partition(",")
-        assert kind == "data:image/png;base64"
-        assert base64.b64decode(data) == picture.path.read_bytes()
+        assert kind == "data:image/webp;base64"
+        with Image.open(picture.path) as drawn, Image.open(BytesIO(base64.b64decode(data))) as shown:
+            apart = np.abs(np.asarray(drawn.convert("RGB"), float) - np.asarray(shown.convert("RGB"), float))
+        assert shown.size == drawn.size
+        assert apart.mean() < 2.0, "the same picture, in fewer bytes"
     text = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert not re.search(r"https?://|@import|<script", text)
+    assert not re.search(r"https?://|@import|<script src|<link", text)
+    assert len(text) < 1.3e6
+    assert all(re.search(r'alt="[^"]+"', tag) for tag in re.findall(r"<img[^>]*>", text))
 
 
 def test_the_verdict_comes_first_then_numbers_pictures_robot_gait_and_making(account, pictures, tmp_path):
@@ -101,10 +110,19 @@ def test_fast_joints_are_told_once_although_plan_and_simulation_warn(robot, tmp_
     assert words.count("planned joint speed above the servo's") == 1
 
 
-def test_a_film_is_embedded_too(account, tmp_path):
+def test_a_film_is_named_and_lies_beside_the_page(account, tmp_path):
     (tmp_path / "walk.gif").write_bytes(b"GIF89a")
     read = page(tmp_path / "report.html", account, [], film=tmp_path / "walk.gif")
-    assert read.references == ["data:image/gif;base64," + base64.b64encode(b"GIF89a").decode()]
+    assert read.references == []
+    assert "beside this page: walk.gif" in read.words
+
+
+def test_reports_of_earlier_results_are_removed_and_nothing_else(account, pictures, tmp_path):
+    assert {picture.path.stem for picture in pictures} <= set(PICTURES)
+    for name in ("report.html", "walk.gif", "margin.png", "mine.png", "trajectory.npz", "notes.html"):
+        (tmp_path / name).write_bytes(b"old")
+    remove_reports(tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {"mine.png", "trajectory.npz", "notes.html"}
 
 
 def test_markup_in_names_is_text(account, robot, tmp_path):
