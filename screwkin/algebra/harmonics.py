@@ -18,7 +18,7 @@ from screwkin.algebra.scalar import Scalar, cos, sin, where
 GRID = 48
 """Cells of the grid for every degree: zeros of limbs come in clusters."""
 PARTS = 16
-"""Into so many parts a cell is divided in which the slope may vanish twice."""
+"""Into so many parts a cell near zero is divided in which the slope may vanish."""
 TOUCH = 1e-7
 """Extremum, over the largest value, at which a polynomial touches zero."""
 STEPS = 12
@@ -55,36 +55,56 @@ def cells(terms: Array) -> Cells:
     x, width = equal_angles(count + 1), 2 * np.pi / count
     x *= (count + 1) / count
     k = np.arange(degree + 1)[:, None]
-    waves = [(1j * k) ** order * np.exp(1j * k * x) for order in range(3)]
+    sizes = (1, width, 2 * width**2)
+    waves = [size * (1j * k) ** order * np.exp(1j * k * x) for order, size in enumerate(sizes)]
     f, d, c = (terms @ np.concatenate([wave.real, -wave.imag]) for wave in waves)
-    change, dips = _kinds(f, d)
-    # where the slope dips it may vanish twice; near zero such a cell is divided
-    owner, cell = _kinds(d, c)[1].nonzero()
-    steepest = np.maximum(np.abs(d[owner, cell]), np.abs(d[owner, cell + 1]))
-    near = np.abs(f[owner, cell]) < width * steepest
-    divided, cell = owner[near], cell[near]
+    negative, downward = f < 0, d < 0
+    change, dips = _kinds(negative, downward)
+    divided, cell = _true(_hiding(f, d, c))
     change[divided, cell] = dips[divided, cell] = False
-    parts = x[cell][:, None] + width / PARTS * np.arange(PARTS + 1)
-    own = np.repeat(terms[divided], PARTS + 1, axis=0).T
-    fine_f, fine_d = (part.reshape(parts.shape) for part in derivatives(list(own), parts.reshape(-1), (0, 1)))
-    fine_change, fine_dips = _kinds(fine_f, fine_d)
-    owner, cell = (change | dips).nonzero()
-    row, part = (fine_change | fine_dips).nonzero()
+    parts = width / PARTS * np.arange(PARTS + 1)
+    here = (terms[divided, : degree + 1] + 1j * terms[divided, degree + 1 :]) * waves[0].T[cell]
+    fine = [((1j * k) ** order * np.exp(1j * k * parts)).conj().T.copy().view(float) for order in (0, 1)]
+    fine_f, fine_d = (here.view(float) @ wave.T for wave in fine)
+    parts = x[cell, None] + parts
+    fine_negative = fine_f < 0
+    fine_change, fine_dips = _kinds(fine_negative, fine_d < 0)
+    owner, cell = _true(change | dips)
+    row, part = _true(fine_change | fine_dips)
     return Cells(
         np.concatenate([owner, divided[row]]),
         np.concatenate([x[cell], parts[row, part]]),
         np.concatenate([x[cell + 1], parts[row, part + 1]]),
         np.concatenate([dips[owner, cell], fine_dips[row, part]]),
-        np.concatenate([f[owner, cell], fine_f[row, part]]) < 0,
+        np.concatenate([negative[owner, cell], fine_negative[row, part]]),
     )
 
 
-def _kinds(f: Array, d: Array) -> tuple[Array, Array]:
-    """Between neighbouring columns (B, n + 1), whether values f change their sign or dip; d are slopes."""
-    negative = f < 0
+def _hiding(f: Array, d: Array, c: Array) -> Array:
+    """Cells (B, n) in which slopes may vanish, even more than once, and values near zero with them.
+
+    Args:
+        f: values (B, n + 1); all are given by size in place.
+        d: slopes, times a cell.
+        c: slopes of these, times twice a cell's square: so much the slopes change in it, seldom more.
+    """
+    for part in (f, d, c):
+        np.abs(part, out=part)
+    flat, near = d < c, f < d + c
+    return (flat[:, 1:] | flat[:, :-1]) & near[:, 1:] & near[:, :-1]
+
+
+def _kinds(negative: Array, downward: Array) -> tuple[Array, Array]:
+    """Between neighbouring columns (B, n + 1), whether values change their sign, or dip, by their slopes."""
     change = negative[:, 1:] != negative[:, :-1]
-    nearing = negative != (d < 0)
+    nearing = negative != downward
     return change, nearing[:, :-1] & ~nearing[:, 1:] & ~change
+
+
+def _true(marks: Array) -> tuple[Integers, Integers]:
+    """Rows and columns of what is True: sought in one row, as few are."""
+    row, column = np.divmod(np.flatnonzero(marks), marks.shape[1])
+    return row, column
 
 
 def harmonics(values: Array) -> Array:

@@ -8,25 +8,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from screwkin.algebra.arrays import Array
+from screwkin.algebra.arrays import Array, Integers
 from screwkin.compiler.program import Program, Recorder
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.compiler.run import run
-from screwkin.ik.closed import EXACT, first_of_its_kind
-from screwkin.ik.eliminated import eliminated, elimination, elimination_programs, exact
+from screwkin.ik.closed import EXACT, SAME, first_of_its_kind
+from screwkin.ik.eliminated import Candidates, eliminated, elimination, elimination_programs, exact
 from screwkin.ik.elimination import BRANCHES
 from screwkin.ik.on_limits import on_limits
-from screwkin.ik.polish import from_guess, iterated, steps
+from screwkin.ik.polish import FOLD, NEAR, ROUGH, both_sides, from_guess, iterated, steps, unfolded
+from screwkin.ik.rank import INSIDE
 from screwkin.ik.relative import relative
-from screwkin.ik.solutions import LimbSolutions, ordered
-from screwkin.kinematics.serial_chain import SerialChain, per_chain, residual
+from screwkin.ik.solutions import KINDS, LimbSolutions, ordered
+from screwkin.kinematics.serial_chain import SerialChain, per_chain
 from screwkin.model.records import LIMIT_TOLERANCE
 
-FOLD = 0.01
-"""Slack of a relative's branches below which the limb's own may fall together elsewhere: a hundred times the
-largest difference of the two limbs, by which slack differs."""
-SIDE = 1e-3
-"""Step [rad] from which the curvature at a fold is computed."""
+APART = 10 * SAME
+"""Difference of two branches' keys below which they may be one: that of six angles ``SAME`` apart is less."""
 
 
 def has_branches(chain: SerialChain) -> bool:
@@ -51,8 +49,81 @@ def branch_solutions(
         tolerances: angle [rad] and distance [m] within which limits are preferred to an exact solution.
         batch: shape with B samples.
     """
-    q, error = _near_relative(chain, target) if by_relative(chain) else eliminated(chain, target)
+    if by_relative(chain):
+        return careful_solutions(chain, *_near_relative(chain, target), target, guess, tolerances, batch)
+    found = eliminated(chain, target, guess)
+    place = np.arange(len(found.sample)) - np.searchsorted(found.sample, found.sample)
+    solutions, at = _at_once(chain, found, place, len(target), batch), _open(found, len(target), tolerances)
+    if len(at):
+        number = np.full(len(target), -1)
+        number[at] = np.arange(len(at))
+        rows = np.flatnonzero((number[found.sample] >= 0) & (place < BRANCHES))
+        slots = number[found.sample[rows]], place[rows]
+        q, error = np.zeros((len(at), BRANCHES, 6)), np.full((len(at), BRANCHES), np.inf)
+        q[slots], error[slots] = found.q[rows], found.error[rows]
+        part = careful_solutions(chain, q, error, target[at], guess[at], tolerances, (len(at),))
+        for name in KINDS:
+            whole, some = getattr(solutions, name), getattr(part, name)
+            whole.reshape(len(target), *some.shape[1:])[at] = some
+    return solutions
+
+
+def _at_once(
+    chain: SerialChain, found: Candidates, place: Integers, count: int, batch: tuple[int, ...]
+) -> LimbSolutions:
+    """The candidates that are solutions, in their order; place: of each among those of its sample."""
+    rows = np.flatnonzero((found.key < -0.5 * INSIDE) & (place < BRANCHES))
+    slots = found.sample[rows], place[rows]
+    q, error = np.full((count, BRANCHES, 6), np.nan), np.full((count, BRANCHES), np.inf)
+    valid, inside = np.zeros((2, count, BRANCHES), dtype=bool)
+    q[slots], error[slots] = found.q[rows], found.error[rows]
+    valid[slots], inside[slots] = True, found.key[rows] < -1.5 * INSIDE
+    once = np.ones((count, BRANCHES), dtype=int)
+    q, valid, inside, error, once = (
+        part.reshape(*batch, *part.shape[1:]) for part in (q, valid, inside, error, once)
+    )
+    return LimbSolutions(chain.limb, chain.names, "branches", q, valid, inside, error, once, chain)
+
+
+def _open(found: Candidates, count: int, tolerances: tuple[float, float]) -> Integers:
+    """Samples with more to decide.
+
+    They have no solution inside the limits, or some that want more Newton steps, that may be one, or that are
+    at a limit or may be put on it.
+    """
+    sample, worst, valid = found.sample, found.worst, found.key < -0.5 * INSIDE
+    open_ = np.ones(count, dtype=bool)
+    open_[sample[(found.key < -1.5 * INSIDE) & (found.error <= ROUGH)]] = False
+    more = (found.error > ROUGH) & (found.error < NEAR)
+    beside = valid & (worst >= LIMIT_TOLERANCE - SAME) & (worst <= max(LIMIT_TOLERANCE + SAME, *tolerances))
+    open_[sample[more | beside]] = True
+    alike = (sample[1:] == sample[:-1]) & (found.key[1:] - found.key[:-1] < APART) & valid[1:]
+    open_[sample[1:][alike]] = True
+    return np.flatnonzero(open_)
+
+
+def careful_solutions(
+    chain: SerialChain,
+    q: Array,
+    error: Array,
+    target: Array,
+    guess: Array,
+    tolerances: tuple[float, float],
+    batch: tuple[int, ...],
+) -> LimbSolutions:
+    """The solutions that branches (B, k, 6) lead to, with all that rounding leaves open decided.
+
+    Args:
+        chain: of the limb.
+        q: changed in place.
+        error: of them (B, k) [m and rad, norm], infinite where there is no branch; changed too.
+        target: exact poses of the tip (B, 4, 4).
+        guess: (B, 6).
+        tolerances: see ``branch_solutions``.
+        batch: shape with B samples.
+    """
     iterated(chain, q, error, target)
+    unfolded(chain, q, error, target)
     from_guess(chain, q, error, target, guess)
     q = chain.wrapped(q)
     if max(tolerances) > LIMIT_TOLERANCE:
@@ -75,7 +146,7 @@ def _near_relative(chain: SerialChain, target: Array) -> tuple[Array, Array]:
     folds = out["slack"] < FOLD
     present[:, k:] = np.tile(folds, 2)
     sample, row = folds.nonzero()
-    ahead, back = _both_sides(chain, near[sample, row], target[sample])
+    ahead, back = both_sides(chain, near[sample, row], target[sample])
     starts[sample, k + row], starts[sample, 2 * k + row] = ahead, back
     q, error = starts, np.full(present.shape, np.inf)
     sample, row = (present & np.isfinite(starts).all(axis=2)).nonzero()
@@ -83,24 +154,6 @@ def _near_relative(chain: SerialChain, target: Array) -> tuple[Array, Array]:
     q[sample, row], error[sample, row] = polished["q"], polished["error"][:, 0]
     first = np.argsort(error, axis=1, kind="stable")[:, :BRANCHES]
     return np.take_along_axis(q, first[..., None], axis=1), np.take_along_axis(error, first, axis=1)
-
-
-def _both_sides(chain: SerialChain, q: Array, target: Array) -> tuple[Array, Array]:
-    """Positions (R, 6) to both sides of a fold, where two branches fall together.
-
-    There one motion v of the joints leaves the tip, to first order, and one part u of the residual, which
-    only the second order of that motion can make vanish.
-    """
-    weights = np.r_[np.ones(3), np.full(3, 1 / chain.length)]
-    U, _, Vt = np.linalg.svd(residual(chain, q, target)[1] * weights[:, None])
-    u, v = U[:, :, -1] * weights, Vt[:, -1]
-    here, ahead, back = (
-        (u * residual(chain, x, target)[0]).sum(axis=1) for x in (q, q + SIDE * v, q - SIDE * v)
-    )
-    bend = (ahead + back - 2 * here) / SIDE**2
-    square = -2 * here / np.where(bend == 0, np.inf, bend)
-    step = np.sqrt(np.clip(square, SIDE**2, FOLD))[:, None] * v
-    return q + step, q - step
 
 
 @per_chain

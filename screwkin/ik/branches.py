@@ -12,12 +12,10 @@ from screwkin.algebra.arrays import Array
 from screwkin.ik.closed import ClosedForm, recognised, solve_closed
 from screwkin.ik.on_limits import on_limits
 from screwkin.ik.programs import limb_branches, limb_pose
-from screwkin.ik.solutions import LimbSolutions, ordered
+from screwkin.ik.solutions import KINDS, LimbSolutions, ordered
 from screwkin.kinematics.arrays import exact_target
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.model.records import LIMIT_TOLERANCE
-
-KINDS = ("q", "valid", "in_limits", "residual")
 
 
 def closed_solutions(

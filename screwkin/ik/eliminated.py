@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,17 +19,24 @@ from screwkin.algebra.se3 import Pose, Vector, norm, unstack
 from screwkin.compiler.program import Program, Recorder
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.compiler.run import run
-from screwkin.ik.elimination import ANGLES, BRANCHES, Elimination, dialytic, eliminations, vanishing
+from screwkin.ik.closed import EXACT
+from screwkin.ik.elimination import ANGLES, Elimination, dialytic, eliminations, vanishing
 from screwkin.ik.polish import polished
+from screwkin.ik.rank import clipped, key_of, kind_of, sines, worst_excess, wrapped_angles
 from screwkin.ik.starts import box, spread
 from screwkin.kinematics.serial_chain import SerialChain, forward, per_chain
 
 BLOCK = 512
 """Samples computed together, which bounds the memory of a large batch."""
-POSES = 24
+POSES = 96
 """Poses at which the ways to eliminate are compared."""
+RARELY = 0.98
+"""Share of them whose errors are compared: ways that are as exact mostly differ in the rest."""
+RARE_ENOUGH = 1e-6
+"""Such an error [rad] with which a way is taken without trying others."""
 EXACT_ENOUGH = 1e-9
-"""Error of the given joint [rad] that costs no branches but those that nearly fall together."""
+"""Error of the given joint [rad], at nine of ten poses, that costs no branches but those that nearly fall
+together."""
 USABLE = 1e-5
 """Error [rad] above which the determinant vanishes for all poses alike."""
 STIR = 1e-5
@@ -62,20 +70,18 @@ def exact(chain: SerialChain) -> bool:
 
 @per_chain
 def _most_exact(chain: SerialChain) -> tuple[Elimination | None, float]:
-    """The way with least errors of the given joint, and how large these are at nine of ten poses [rad].
-
-    Any way with errors up to ``EXACT_ENOUGH`` is taken without trying others.
-    """
-    best, least = None, np.inf
+    """The way with least errors, rare ones counted, and what they are at nine of ten poses [rad]."""
+    best, least, most = None, np.inf, np.inf
     if len(chain.screws) == 6 and chain.turning.all():
         low, high = box(chain)
         q = low + spread(6, POSES, 0) * (high - low)
         tips, _ = forward(chain.screws, unstack(q), chain.tip)
         for way in eliminations(chain):
-            error = float(np.quantile(_errors(way, tips, q), 0.9))
-            if error < least:
-                best, least = way, error
-            if error <= EXACT_ENOUGH:
+            errors = _errors(way, tips, q)
+            error, rare = (float(np.quantile(errors, share)) for share in (0.9, RARELY))
+            if rare < most:
+                best, least, most = way, error, rare
+            if rare <= RARE_ENOUGH:
                 break
     return best, least
 
@@ -119,35 +125,51 @@ def _at(table: Array, x: Array) -> Array:
     return np.asarray(fixed + np.cos(x) * cosine + np.sin(x) * sine)
 
 
-def eliminated(chain: SerialChain, target: Array) -> tuple[Array, Array]:
-    """The branches of a limb that has an elimination.
+class Candidates(NamedTuple):
+    """Branches (R,) of samples, those of each in order: best first, as ``ik.rank`` says.
+
+    Attributes:
+        sample: whose.
+        q: (R, 6), angles in (-pi, pi], or one turn off where only that is in the limits.
+        error: norm of the residual [m and rad].
+        worst: how far the worst joint lies beyond its limits [rad], negative inside.
+        key: what orders them.
+    """
+
+    sample: Integers
+    q: Array
+    error: Array
+    worst: Array
+    key: Array
+
+
+def eliminated(chain: SerialChain, target: Array, guess: Array) -> Candidates:
+    """The candidates of a limb that has an elimination: what the zeros of the determinant lead to.
 
     Args:
         chain: of the limb.
         target: exact poses of the tip (B, 4, 4).
-
-    Returns:
-        q (B, 16, 6); error (B, 16) [m and rad, norm], infinite where there is no branch.
+        guess: (B, 6), to which the nearest branch comes first.
     """
-    q, error = np.zeros((len(target), BRANCHES, 6)), np.full((len(target), BRANCHES), np.inf)
-    for start in range(0, len(target), BLOCK):
-        owner, angles, far = _candidates(chain, target[start : start + BLOCK])
-        place = np.arange(len(owner)) - np.searchsorted(owner, owner)
-        few = place < BRANCHES
-        q[start + owner[few], place[few]] = angles[few]
-        error[start + owner[few], place[few]] = far[few]
-    return q, error
+    starts = range(0, max(len(target), 1), BLOCK)
+    blocks = [_candidates(chain, target[i : i + BLOCK], guess[i : i + BLOCK], i) for i in starts]
+    return Candidates(*map(np.concatenate, zip(*blocks, strict=True)))
 
 
-def _candidates(chain: SerialChain, target: Array) -> tuple[Integers, Array, Array]:
-    """Sample (R,), angles (R, 6) and error (R,) of every zero of the determinant."""
+def _candidates(chain: SerialChain, target: Array, guess: Array, first: int) -> Candidates:
+    """Those of a block of samples, from the number of the first one on."""
     table = run(equations(chain), {"target": target})["table"]
     x = equal_angles(ANGLES)
-    matrices = np.stack([np.ones(ANGLES), np.cos(x), np.sin(x)], axis=1) @ table
-    owner, zero = _zeros(run(values(), {"matrix": matrices})["value"][..., 0])
+    waves = np.stack([np.ones(ANGLES), np.cos(x), np.sin(x)], axis=1)
+    matrices = (waves @ table.swapaxes(0, 1).reshape(3, -1)).reshape(ANGLES, len(target), -1)
+    owner, zero = _zeros(run(values(), {"matrix": matrices})["value"][..., 0].T)
     circle = np.stack([np.cos(zero), np.sin(zero)], axis=1)
-    out = run(branch(chain), {"target": target[owner], "circle": circle, "table": table[owner]})
-    return owner, out["q"], out["error"][:, 0]
+    given = {"target": target[owner], "guess": guess[owner], "circle": circle, "table": table[owner]}
+    out = run(branch(chain), given)
+    error, worst, key = (out[name][:, 0] for name in ("error", "worst", "key"))
+    order = np.lexsort((key, owner))
+    parts = (part[order] for part in (owner + first, out["q"], error, worst, key))
+    return Candidates(*parts)
 
 
 def _zeros(value: Array) -> tuple[Integers, Array]:
@@ -214,13 +236,20 @@ def branch(chain: SerialChain) -> Program:
     recorder = Recorder(
         identifier(chain.limb, "branch"),
         f"Joint positions of {chain.limb} for an angle of one joint at which six equations have a common"
-        " solution, after Newton steps; error: norm of the residual [m and rad].",
+        " solution, after Newton steps; error: norm of the residual [m and rad]; worst: beyond limits;"
+        " key: order.",
     )
-    target, (c, s) = pose_input(recorder, "target"), recorder.input("circle", 2)
+    target, guess = pose_input(recorder, "target"), recorder.input("guess", 6)
+    c, s = recorder.input("circle", 2)
     q = way.branch(way.displacement(target), c, s, recorder.input("table", 3, 54))
-    q, error = polished(chain, q, target)
+    angles, error = polished(chain, q, target)
+    q = wrapped_angles(chain, angles)
+    worst = worst_excess(chain, q)
+    kind = kind_of(worst, error <= EXACT)
     recorder.output("q", q)
     recorder.output("error", [error])
+    recorder.output("worst", [worst])
+    recorder.output("key", [key_of(angles, sines(clipped(chain, guess)), kind)])
     return recorder.program()
 
 

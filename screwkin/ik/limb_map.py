@@ -19,7 +19,7 @@ from screwkin.algebra.singular_values import TRUSTED, Extremes, extreme_singular
 from screwkin.compiler.program import Program, Recorder, kept
 from screwkin.compiler.records import identifier
 from screwkin.ik.closed import closed_form
-from screwkin.ik.programs import cosines, wrapped_angles
+from screwkin.ik.rank import cosines, wrapped_angles
 from screwkin.kinematics.limits import beyond
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.limb_motion import displacements_seen_from

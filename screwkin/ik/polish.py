@@ -13,7 +13,8 @@ from screwkin.algebra.se3 import Pose, Twist, cross
 from screwkin.compiler.program import Program, Recorder
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.compiler.run import run
-from screwkin.kinematics.serial_chain import SerialChain, forward, miss, per_chain
+from screwkin.ik.closed import EXACT
+from screwkin.kinematics.serial_chain import SerialChain, forward, miss, per_chain, residual
 from screwkin.mechanism.limb_rates import pose_rates
 
 NEWTON = 2
@@ -26,6 +27,11 @@ ROUNDS = 12
 """Bound on the rounds of Newton steps there."""
 LONGEST = 0.3
 """Largest change of an angle in such a step [rad]."""
+FOLD = 0.01
+"""Slack of a relative's branches below which the limb's own may fall together elsewhere: a hundred times the
+largest difference of the two limbs, by which slack differs."""
+SIDE = 1e-3
+"""Step [rad] from which the curvature at a fold is computed."""
 
 
 def polished(chain: SerialChain, q: Sequence[Scalar], target: Pose) -> tuple[list[Scalar], Scalar]:
@@ -71,6 +77,47 @@ def iterated(chain: SerialChain, q: Array, error: Array, target: Array) -> None:
         target: exact poses of the tip (B, 4, 4).
     """
     _repeated(chain, q, error, target, (error > ROUGH) & (error < NEAR))
+
+
+def unfolded(chain: SerialChain, q: Array, error: Array, target: Array) -> None:
+    """Where Newton steps have stopped next to a solution, put those to both sides there, in place.
+
+    Between two branches that nearly fall together they do not know where to go. One side's takes the place of
+    the branch, the other's that of the worst.
+
+    Args:
+        chain: of six joints.
+        q: branches (B, k, 6).
+        error: of them (B, k) [m and rad, norm].
+        target: exact poses of the tip (B, 4, 4).
+    """
+    owner, k = ((error > EXACT) & (error < NEAR)).nonzero()
+    if not len(owner):
+        return
+    for ahead, start in enumerate(both_sides(chain, q[owner, k], target[owner])):
+        near, far = start[:, None], np.full((len(owner), 1), np.inf)
+        _repeated(chain, near, far, target[owner], far > 0)
+        good = far[:, 0] <= EXACT
+        place = k if not ahead else error[owner].argmax(axis=1)
+        q[owner[good], place[good]], error[owner[good], place[good]] = near[good, 0], far[good, 0]
+
+
+def both_sides(chain: SerialChain, q: Array, target: Array) -> tuple[Array, Array]:
+    """Positions (R, 6) to both sides of a fold, where two branches fall together.
+
+    There one motion v of the joints leaves the tip, to first order, and one part u of the residual, which
+    only the second order of that motion can make vanish.
+    """
+    weights = np.r_[np.ones(3), np.full(3, 1 / chain.length)]
+    U, _, Vt = np.linalg.svd(residual(chain, q, target)[1] * weights[:, None])
+    u, v = U[:, :, -1] * weights, Vt[:, -1]
+    here, ahead, back = (
+        (u * residual(chain, x, target)[0]).sum(axis=1) for x in (q, q + SIDE * v, q - SIDE * v)
+    )
+    bend = (ahead + back - 2 * here) / SIDE**2
+    square = -2 * here / np.where(bend == 0, np.inf, bend)
+    step = np.sqrt(np.clip(square, SIDE**2, FOLD))[:, None] * v
+    return q + step, q - step
 
 
 def from_guess(chain: SerialChain, q: Array, error: Array, target: Array, guess: Array) -> None:

@@ -11,15 +11,16 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 from screwkin.algebra import scalar
-from screwkin.algebra.scalar import Scalar, abs_, larger, least, where
+from screwkin.algebra.scalar import Scalar, abs_, larger, where
 from screwkin.algebra.se3 import NO_TWIST, ZERO, Pose, Vector
 from screwkin.compiler.program import Program, Recorder
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.ik.all_branches import branch_programs, has_branches
 from screwkin.ik.closed import EXACT, recognised
+from screwkin.ik.rank import INSIDE, Pairs, clipped, key_of, kind_of, sines, worst_excess, wrapped_angles
 from screwkin.kinematics.arrays import Argument
 from screwkin.kinematics.door import Door
-from screwkin.kinematics.limits import CUT, TURN, beyond, turn_within
+from screwkin.kinematics.limits import CUT, TURN, turn_within
 from screwkin.kinematics.rigid import nearest_pose
 from screwkin.kinematics.serial_chain import SerialChain, miss, per_chain
 from screwkin.kinematics.status import SINGULAR
@@ -35,38 +36,6 @@ TIE = 1e-9
 """Difference of the sums of (1 - cos) above which one branch is nearer to the guess than another."""
 NEAR_LIMIT = 1e-10
 """Excess [rad] closer than this to the tolerance of limits is not decided by a program."""
-INSIDE = 100.0
-"""What being inside the limits counts, more than the nearness of two branches can differ."""
-Pairs = list[tuple[Scalar, Scalar]]
-
-
-def _clipped(chain: SerialChain, guess: Sequence[Scalar]) -> list[Scalar]:
-    """The guess, inside the limits: as such it counts."""
-    ends = zip(guess, chain.lower.tolist(), chain.upper.tolist(), strict=True)
-    held = []
-    for x, low, high in ends:
-        x = larger(x, low) if math.isfinite(low) else x
-        held.append(least(x, high) if math.isfinite(high) else x)
-    return held
-
-
-def _sines(q: Sequence[Scalar]) -> Pairs:
-    return [(scalar.sin(x), scalar.cos(x)) for x in q]
-
-
-def cosines(q: Sequence[Scalar], near: Sequence[tuple[Scalar, Scalar]]) -> list[Scalar]:
-    """Cosines of the differences of angles from others, given by sine and cosine."""
-    return [scalar.sin(x) * s + scalar.cos(x) * c for x, (s, c) in zip(q, near, strict=True)]
-
-
-def wrapped_angles(chain: SerialChain, q: Sequence[Scalar]) -> list[Scalar]:
-    """Angles in (-pi, pi], or one turn off where only that is within the limits (``limits.wrapped``)."""
-    angles = []
-    for x, low, high in zip(q, chain.lower.tolist(), chain.upper.tolist(), strict=True):
-        x = scalar.arc(scalar.sin(x), scalar.cos(x))
-        x = where(x <= CUT - math.pi, x + TURN, x)
-        angles.append(turn_within(x, low, high) if high > math.pi or low < -math.pi else x)
-    return angles
 
 
 @per_chain
@@ -83,18 +52,16 @@ def limb_branches(chain: SerialChain, position: bool) -> Door:
     )
     arguments = _arguments(chain, "T_base_tip", position)
     target = _target(recorder, arguments[0])
-    near = _sines(_clipped(chain, recorder.input("guess", len(chain.names))))
+    near = sines(clipped(chain, recorder.input("guess", len(chain.names))))
     rows, certified = [], 1.0
     for *angles, slack in form.formula(target):
         q = wrapped_angles(chain, angles)
         error = miss(chain, angles, target)
-        worst = _worst(chain, q)
+        worst = worst_excess(chain, q)
         solves = error <= EXACT
         clear = (slack > CLEAR) & solves & (abs_(worst - LIMIT_TOLERANCE) > NEAR_LIMIT)
         certified = where(clear | ((slack < -CLEAR) & ~solves), certified, 0.0)
-        kind = where(solves, where(worst <= LIMIT_TOLERANCE, 2.0, 1.0), 0.0)
-        apart = sum(1.0 - cosine for cosine in cosines(angles, near))
-        rows.append([apart - INSIDE * kind, error, *q])
+        rows.append([key_of(angles, near, kind_of(worst, solves)), error, *q])
     rows = _sorted(rows)
     kinds = [where(key < -1.5 * INSIDE, 2.0, where(key < -0.5 * INSIDE, 1.0, 0.0)) for key, *_ in rows]
     for one, other in pairwise(rows):
@@ -119,15 +86,6 @@ def _target(recorder: Recorder, argument: Argument) -> Pose | Vector:
     """An input that is a position, or a pose, whose rotation is made exact to the last digit."""
     scalars = recorder.input(argument.name, *argument.shape)
     return nearest_pose(scalars) if argument.rigid else Vector(*scalars)
-
-
-def _worst(chain: SerialChain, q: Sequence[Scalar]) -> Scalar:
-    """How far the joint furthest beyond its limits lies, negative inside."""
-    worst = -math.inf
-    for x, low, high in zip(q, chain.lower.tolist(), chain.upper.tolist(), strict=True):
-        if math.isfinite(low) or math.isfinite(high):
-            worst = larger(beyond(x, low, high), worst)
-    return worst
 
 
 def _sorted(rows: Sequence[list[Scalar]]) -> list[list[Scalar]]:
@@ -210,13 +168,13 @@ def _nearest(
     """
     form = recognised(chain, isinstance(target, Vector))
     assert form is not None
-    held = _clipped(chain, guess)
-    near = _sines(held)
+    held = clipped(chain, guess)
+    near = sines(held)
     none, least_key = -4.0 * INSIDE, -3.0 * INSIDE
     best: list[Scalar] = [none, *(x for pair in near for x in pair)]
     second: Scalar = none
     for *angles, slack in form.formula(target):
-        pairs = _sines(angles)
+        pairs = sines(angles)
         alike = sum(s * a + c * b for (s, c), (a, b) in zip(pairs, near, strict=True))
         inside, decided = _inside(chain, pairs)
         clear = (slack > CLEAR) & decided

@@ -23,6 +23,8 @@ ABSENT = 1e6
 """Cost of a branch that is no solution."""
 TIE = 1e-10
 """Difference of the sums of (1 - cos) below which two branches are equally near to the guess."""
+KINDS = ("q", "valid", "in_limits", "residual")
+"""What solutions of some samples replace in those of a batch."""
 DIGITS = 6
 """Decimals [rad or m] by which branches that are equally near are compared, joint by joint."""
 

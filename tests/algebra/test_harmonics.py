@@ -42,6 +42,17 @@ def test_every_real_zero_is_found_to_rounding_also_in_clusters(gap: float) -> No
         np.testing.assert_allclose(zeros_of(values), zeros, atol=1e-9 / gap)
 
 
+@pytest.mark.parametrize("count", [3, 4])
+def test_zeros_that_share_a_cell_of_the_grid_are_found(count: int) -> None:
+    """Of 48 cells a degree each is a thirtieth wide here; the values' signs at its ends do not show them."""
+    rng = np.random.default_rng(2)
+    for start in np.linspace(2.5, 2.6, 40):
+        apart = np.cumsum(rng.uniform(0.004, 0.008, count))
+        zeros = np.r_[start + apart, rng.uniform(3.5, 5.5, 6 - count)]
+        values = polynomial(zeros, equal_angles(7))
+        np.testing.assert_allclose(zeros_of(values), np.sort(zeros), atol=1e-4)
+
+
 def test_derivatives_are_those_of_finite_differences() -> None:
     terms = list(np.random.default_rng(0).normal(size=10))
     value, slope, curvature = derivatives(terms, 0.7, (0, 1, 2))

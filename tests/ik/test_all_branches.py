@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 
 import screwkin as sk
+from screwkin.algebra.arrays import Integers
 from screwkin.algebra.linear import determinant, null_vector
 from screwkin.errors import InputError
+from screwkin.ik import all_branches
 from screwkin.ik.all_branches import has_branches
 from screwkin.ik.closed import recognised
+from screwkin.ik.eliminated import Candidates
 from screwkin.ik.methods import solve_limb_arrays
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.solutions import LimbSolutions
@@ -131,6 +134,34 @@ def test_a_pose_alone_has_the_branches_that_it_has_in_a_batch() -> None:
         alone = solved(chain, T[k])
         np.testing.assert_array_equal(alone.valid, whole.valid[k])
         np.testing.assert_allclose(alone.q, whole.q[k], atol=1e-9)
+
+
+def test_what_is_decided_at_once_is_what_care_decides(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The samples that leave nothing open take a shorter way to the same answer."""
+    leg, rng = pairs_leg(), np.random.default_rng(6)
+    chain, T, guess = limited(leg), leg.reach(rng.uniform(LOW, HIGH, (120, 6))), rng.uniform(LOW, HIGH, 6)
+    taken = all_branches._open
+    opened: list[int] = []
+
+    def counted(found: Candidates, count: int, tolerances: tuple[float, float]) -> Integers:
+        opened.append(len(taken(found, count, tolerances)))
+        return np.arange(count) if len(opened) > 1 else taken(found, count, tolerances)
+
+    monkeypatch.setattr(all_branches, "_open", counted)
+    one, other = solved(chain, T, guess), solved(chain, T, guess)
+    assert opened[0] < 60
+    np.testing.assert_array_equal(one.valid, other.valid)
+    np.testing.assert_array_equal(one.in_limits, other.in_limits)
+    np.testing.assert_allclose(one.q, other.q, atol=1e-11)
+
+
+def test_branches_between_which_newton_stops_are_both_found() -> None:
+    """Two branches 1e-3 apart: one zero of the determinant to rounding, and a singular place between them."""
+    chain = limited(pairs_leg())
+    q = np.random.default_rng(8).uniform(LOW, HIGH, (400, 6))
+    q[:, 3] = np.random.default_rng(9).uniform(0.0, 2e-3, 400)
+    found = solved(chain, pairs_leg().reach(q))
+    assert ((apart(found.q, q[:, None]) < 1e-5) & found.valid).any(axis=1).mean() >= 0.99
 
 
 def test_a_pose_out_of_reach_ends_at_the_nearest() -> None:
