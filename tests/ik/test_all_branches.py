@@ -17,8 +17,9 @@ from screwkin.ik.closed import recognised
 from screwkin.ik.eliminated import Candidates
 from screwkin.ik.methods import solve_limb_arrays
 from screwkin.ik.numeric import IkSettings
+from screwkin.ik.polish import unfolded
 from screwkin.ik.solutions import LimbSolutions
-from screwkin.kinematics.serial_chain import SerialChain
+from screwkin.kinematics.serial_chain import SerialChain, distance, residual
 from screwkin.kinematics.status import Status
 from tests.ik.legs import Leg, apart, nearly, offset_leg, random_tip, spherical_leg, unit
 from tests.laws.limbs import inside, random_robot, targets_at
@@ -155,13 +156,28 @@ def test_what_is_decided_at_once_is_what_care_decides(monkeypatch: pytest.Monkey
     np.testing.assert_allclose(one.q, other.q, atol=1e-11)
 
 
-def test_branches_between_which_newton_stops_are_both_found() -> None:
-    """Two branches 1e-3 apart: one zero of the determinant to rounding, and a singular place between them."""
-    chain = limited(pairs_leg())
-    q = np.random.default_rng(8).uniform(LOW, HIGH, (400, 6))
-    q[:, 3] = np.random.default_rng(9).uniform(0.0, 2e-3, 400)
-    found = solved(chain, pairs_leg().reach(q))
-    assert ((apart(found.q, q[:, None]) < 1e-5) & found.valid).any(axis=1).mean() >= 0.99
+def test_both_branches_beside_a_fold_are_reached_from_between_them() -> None:
+    """There the Jacobian is singular, and Newton steps know no way."""
+    chain, leg = limited(pairs_leg()), pairs_leg()
+    low, high = np.array([0.3, -0.2, 0.4, 0.5, 0.2, 0.1]), np.array([0.3, -0.2, 0.4, -0.5, 0.2, 0.1])
+
+    def jacobian(q: np.ndarray) -> np.ndarray:
+        return np.asarray(residual(chain, q[None], leg.reach(q[None]))[1][0])
+
+    for _ in range(60):
+        middle = (low + high) / 2
+        same = np.linalg.det(jacobian(middle)) * np.linalg.det(jacobian(low)) > 0
+        low, high = (middle, high) if same else (low, middle)
+    own = low + 3e-3 * np.linalg.svd(jacobian(low))[2][-1]
+    target = leg.reach(own[None])
+    q, error = np.zeros((1, 16, 6)), np.full((1, 16), np.inf)
+    q[0, 5], error[0, 5] = low, distance(chain, low[None], target)[0]
+    assert 1e-9 < error[0, 5] < 1e-2
+    unfolded(chain, q, error, target)
+    solved_ones = q[0, error[0] < 1e-12]
+    assert len(solved_ones) == 2
+    assert apart(solved_ones, own).min() < 1e-8
+    assert 1e-3 < apart(*solved_ones) < 1e-2
 
 
 def test_a_pose_out_of_reach_ends_at_the_nearest() -> None:
