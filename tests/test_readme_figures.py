@@ -75,8 +75,6 @@ def test_engines_say_of_the_walk_what_the_table_says(row: Row, engine: Engine) -
     assert check.passed == (said == "both pass")
     assert check.fell == (said == "it falls in both")
     if rms:
+        most = float(rms.split()[-1]) + (0.0 if rms.startswith("below") else 0.0501)
         assert check.zmp_rms_mm is not None
-        if rms.startswith("below"):
-            assert check.zmp_rms_mm < float(rms.split()[1])
-        else:
-            assert check.zmp_rms_mm == pytest.approx(float(rms), abs=0.0501)
+        assert check.zmp_rms_mm < most, "the larger of both engines is shown"

@@ -164,7 +164,7 @@ def _label(axes: Axes, place: Array, text: str, colour: str) -> None:
     """Beside an edge, on the side that looks away from the middle of the picture."""
     left = place[0] < -1e-6
     at = {"xytext": (-5 if left else 5, 0), "textcoords": "offset points", "ha": "right" if left else "left"}
-    axes.annotate(text, place, fontsize=6, color=colour, va="center", **at)
+    axes.annotate(text, place, fontsize=5.5, color=colour, va="center", **at)
 
 
 def _circuit(
