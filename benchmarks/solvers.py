@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import json
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import product
@@ -29,6 +29,7 @@ from screwkin.gait.balance import zmp
 MOTIONS = ("stand", "squat", "walk")
 ENGINES: tuple[Engine, ...] = ("mujoco", "pybullet")
 """The faster one first."""
+NAMES = {"mujoco": "MuJoCo", "pybullet": "PyBullet"}
 DEPTH = 0.08
 """How far a squat lowers the base, as a share of its height."""
 ALLOWED = 2.0
@@ -109,9 +110,10 @@ def merged(rows: Sequence[Row]) -> list[Row]:
         one = motions.setdefault((row["file"], row["motion"]), dict(row))
         if "engines" in row:
             one["engines"] = {**one.get("engines", {}), **row["engines"]}
+            one["reasons"] = list(dict.fromkeys([*one.get("reasons", []), *row.get("reasons", [])]))
     return sorted(
         motions.values(),
-        key=lambda row: (row.get("name", row["file"]), row["file"], MOTIONS.index(row["motion"])),
+        key=lambda row: (Path(row["file"]).parts[-2:], MOTIONS.index(row["motion"])),
     )
 
 
@@ -122,6 +124,18 @@ def same(row: Row) -> bool:
     )
 
 
+def counted(rows: Sequence[Row]) -> Callable[[str], str]:
+    """How many motions of an engine outlast finer settings, as a text."""
+
+    def count(engine: str) -> str:
+        own = [
+            {"engines": {engine: row["engines"][engine]}} for row in rows if engine in row.get("engines", {})
+        ]
+        return f"{sum(map(same, own))} of {len(own)} motions in {NAMES[engine]}"
+
+    return count
+
+
 def _moved(own: Row) -> float:
     span = own["spread"]["zmp_rms_mm"]
     return float("inf") if span is None else float(span[1] - span[0])
@@ -130,7 +144,6 @@ def _moved(own: Row) -> float:
 def markdown(rows: Sequence[Row]) -> str:
     """A line for every motion."""
     rows = merged(rows)
-    simulated = [row for row in rows if "engines" in row]
     lines = [
         "# Verdicts at finer settings",
         "",
@@ -138,15 +151,15 @@ def markdown(rows: Sequence[Row]) -> str:
         "the iterations; `python -m benchmarks.solvers FILE...`. ZMP: least and largest RMS against the plan",
         "over the three [mm].",
         "",
-        f"{sum(map(same, simulated))} of {len(simulated)} motions: the same verdict, and the RMS within "
-        f"{ALLOWED:g} mm.",
+        f"The same verdict, and the RMS within {ALLOWED:g} mm: {'; '.join(map(counted(rows), ENGINES))}.",
+        "Motions without a verdict of an engine have not been simulated in it.",
         "",
         "| robot | kg | joints | motion | PyBullet | ZMP | MuJoCo | ZMP |",
         "|---|---:|---:|---|---|---|---|---|",
     ]
     for row in rows:
-        name, mass = row.get("name", Path(row["file"]).stem), row.get("mass", 0.0)
-        head = f"| {name} | {mass:.1f} | {row.get('joints', '')} |"
+        file = "/".join(Path(row["file"]).parts[-2:])
+        head = f"| {file} | {row.get('mass', 0.0):.1f} | {row.get('joints', '')} |"
         if "engines" not in row:
             lines.append(f"{head} {row['motion']} | {row['reason'].replace('|', '/')} | | | |")
             continue
@@ -157,6 +170,12 @@ def markdown(rows: Sequence[Row]) -> str:
             span = own["spread"]["zmp_rms_mm"] if own else None
             cells += ["/".join(said), "" if span is None else f"{span[0]:.2f} to {span[1]:.2f}"]
         lines.append(f"{head} {row['motion']} | {' | '.join(cells)} |")
+    why = [
+        f"- {Path(row['file']).name}, {row['motion']}: {'; '.join(row['reasons'])}"
+        for row in rows
+        if row.get("reasons")
+    ]
+    lines += ["", "What fails, and why:", "", *why] if why else []
     return "\n".join(lines) + "\n"
 
 

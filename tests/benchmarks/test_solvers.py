@@ -26,9 +26,9 @@ def test_a_verdict_outlasts_finer_settings_if_neither_it_nor_its_zmp_moves() -> 
     assert markdown(rows[:1]).count("| walk |") == 1
     rows = [one | {"file": f"{k}.urdf"} for k, one in enumerate(rows)]
     text = markdown([*rows, {"file": "b.urdf", "motion": "stand", "reason": "no legs"}])
-    assert "1 of 3 motions" in text
-    assert "| one | 30.0 | 12 | walk |  |  | passes | 0.10 to 1.90 |" in text
-    assert "| b | 0.0 |  | stand | no legs |" in text
+    assert "1 of 3 motions in MuJoCo; 0 of 0 motions in PyBullet." in text
+    assert "| 0.urdf | 30.0 | 12 | walk |  |  | passes | 0.10 to 1.90 |" in text
+    assert "| b.urdf | 0.0 |  | stand | no legs |" in text
 
 
 def test_rows_of_both_engines_are_one_line_that_needs_both() -> None:
