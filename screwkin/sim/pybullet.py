@@ -19,15 +19,13 @@ from typing import Any, Literal
 
 import numpy as np
 
-from screwkin.algebra.arrays import Array
-from screwkin.algebra.se3 import as_array
 from screwkin.dynamics.terrain import FLAT, Terrain
 from screwkin.errors import InputError, MissingDependencyError
 from screwkin.kinematics.positions import tree_positions
-from screwkin.model.robot import Limb, Robot
+from screwkin.model.robot import Robot
 from screwkin.model.state import State
-from screwkin.model.urdf import urdf_frames, urdf_of_bodies
-from screwkin.sim.backend import Command, Contact, Observation, moment_about_origin
+from screwkin.model.urdf import urdf_of_bodies
+from screwkin.sim.backend import Command, Contact, Observation
 from screwkin.sim.bodies import check_feet, solid
 from screwkin.sim.camera import Camera
 from screwkin.sim.couplings import couple_in_pybullet
@@ -35,7 +33,8 @@ from screwkin.sim.drive import UNLIMITED, RigidServos, Servos, motored
 from screwkin.sim.floor import bounce_in_pybullet, floor_in_pybullet
 from screwkin.sim.loops import close_in_pybullet, quat_xyzw
 from screwkin.sim.perturbation import NONE, Perturbation, noted
-from screwkin.sim.pybullet_look import Look
+from screwkin.sim.pybullet_feet import Feet
+from screwkin.sim.pybullet_look import Look, pose_of
 from screwkin.sim.quiet import quiet
 from screwkin.sim.rotors import RelativeRotors, with_rotors
 
@@ -69,18 +68,6 @@ class Physics:
     gravity: float = 9.81
     sole_stiffness: float | None = None
     sole_damping: float = 20.0
-
-
-@dataclass(frozen=True, eq=False)
-class _Foot:
-    """A leg's last link: PyBullet's index, row in a ``Look``, tip, axis of the joint above, mass [kg]."""
-
-    index: int
-    row: int
-    T_link_tip: Array
-    axis_in_inertial: Array
-    turns: bool
-    mass: float
 
 
 class PyBulletBackend:
@@ -150,9 +137,8 @@ class PyBulletBackend:
             every = np.append(rotors, np.zeros(len(robot.coupled)))
             self._rotors = RelativeRotors(self._p, self._here, self._body, self._tree, every, floats)
         info = self._p.getDynamicsInfo(self._body, -1, **self._here)
-        self._T_base_inertial = self._pose(info[3], info[4])
-        self._T_inertial_base = np.linalg.inv(self._T_base_inertial)
-        self._feet = [self._foot(limb) for limb in robot.limbs if limb.kind == "leg"]
+        self._T_base_inertial = pose_of(info[3], info[4])
+        self._feet = Feet(self._p, self._here, self._body, self._tree, robot, self._link_names)
         self._soften_soles()
 
     def _make_floor(self, terrain: Terrain) -> tuple[int, ...]:
@@ -219,10 +205,10 @@ class PyBulletBackend:
         physics = self._physics
         if physics.sole_stiffness is None:
             return
-        for foot in self._feet:
+        for index in self._feet.indices:
             self._p.changeDynamics(
                 self._body,
-                foot.index,
+                index,
                 contactStiffness=physics.sole_stiffness,
                 contactDamping=physics.sole_damping,
                 **self._here,
@@ -230,28 +216,6 @@ class PyBulletBackend:
 
     def _looked(self) -> Look:
         return Look(self._p, self._here, self._body, self._tree)
-
-    def _foot(self, limb: Limb) -> _Foot:
-        robot, p = self._robot, self._p
-        index = self._link_names.index(limb.link) - 1
-        p.enableJointForceTorqueSensor(self._body, index, True, **self._here)
-        info = p.getDynamicsInfo(self._body, index, **self._here)
-        joint = robot.tree[robot.joint_above[limb.link]]
-        back = urdf_frames(robot)[limb.link].inverse
-        R_inertial_link = self._pose((0.0, 0.0, 0.0), info[4])[:3, :3].T
-        return _Foot(
-            index=index,
-            row=self._tree.index(index),
-            T_link_tip=as_array(back @ limb.frame),
-            axis_in_inertial=R_inertial_link @ as_array(back.R @ joint.screw.s),
-            turns=joint.type == "revolute",
-            mass=info[0],
-        )
-
-    def _pose(self, position: Any, quat_xyzw: Any) -> Array:
-        a, b, c, d, e, f, g, h, i = self._p.getMatrixFromQuaternion(quat_xyzw)
-        x, y, z = position
-        return np.array([[a, b, c, x], [d, e, f, y], [g, h, i, z], [0.0, 0.0, 0.0, 1.0]])
 
     def reset(self, state: State) -> Observation:
         """Place the robot at rest in a state, and time at 0."""
@@ -318,21 +282,17 @@ class PyBulletBackend:
     def observe(self) -> Observation:
         """The state after the last step."""
         look, count = self._look, len(self._joints)
+        poses = self._feet.poses(look)
         return Observation(
             time=self._steps * self.dt,
-            T_world_base=self._pose(*look.base) @ self._T_inertial_base,
+            T_world_base=poses[0],
             q=look.q[:count],
             qd=look.qd[:count],
             torque=self._applied + look.motor[:count],
-            T_world_foot=np.array([self._foot_pose(foot) for foot in self._feet]).reshape(-1, 4, 4),
-            ankle_wrench=np.array([self._ankle_wrench(foot) for foot in self._feet]).reshape(-1, 6),
+            T_world_foot=poses[1:],
+            ankle_wrench=self._feet.wrenches(look, self._gravity),
             contacts=tuple(self._contacts()),
         )
-
-    def _foot_pose(self, foot: _Foot) -> Array:
-        """World pose (4, 4) of a foot's tip."""
-        link = self._look.links[foot.row]
-        return self._pose(link[4], link[5]) @ foot.T_link_tip
 
     def _contacts(self) -> Iterator[Contact]:
         """Points where the floor presses on the robot; the force includes friction."""
@@ -344,22 +304,6 @@ class PyBulletBackend:
             a, b = touch[10], touch[12]
             force = x * pressing + a * u + b * r, y * pressing + a * v + b * s, z * pressing + a * w + b * t
             yield Contact(self._link_names[touch[3] + 1], touch[6], force)
-
-    def _ankle_wrench(self, foot: _Foot) -> Array:
-        """Ground wrench [m; f] about the world origin, from the sensor in the joint above a foot at rest.
-
-        PyBullet reports the reaction on the child in the child's inertial frame, about its CoM, without the
-        share of the motor. The floor supplies what is needed beside that and the foot's weight.
-        """
-        (_, _, reaction, motor), link = self._look.joints[foot.row], self._look.links[foot.row]
-        force, moment = np.array(reaction[:3]), np.array(reaction[3:])
-        if foot.turns:
-            moment = moment + motor * foot.axis_in_inertial
-        else:
-            force = force + motor * foot.axis_in_inertial
-        T = self._pose(link[0], link[1])
-        f = -foot.mass * self._gravity - T[:3, :3] @ force
-        return np.concatenate([moment_about_origin(T[:3, 3], f) - T[:3, :3] @ moment, f])
 
     def close(self) -> None:
         """Disconnect; closing twice is harmless."""

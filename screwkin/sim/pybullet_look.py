@@ -74,6 +74,11 @@ class Look:
         return np.array([self.base[1], *[link[1] for link in self.links]])
 
     @cached_property
+    def axes(self) -> Array:
+        """The same as rotation matrices (1 + n, 3, 3)."""
+        return rotations(self.turned)
+
+    @cached_property
     def touches(self) -> Any:
         """Points that touch what is not the body."""
         return self._p.getContactPoints(self._body, **self._client)
@@ -83,6 +88,13 @@ def rotations(quats_xyzw: Array) -> Array:
     """Rotation matrices (K, 3, 3) of unit quaternions (K, 4)."""
     squares = quats_xyzw[:, :, None] * quats_xyzw[:, None]
     return np.asarray((squares.reshape(-1, 16) @ _ROTATION).reshape(-1, 3, 3))
+
+
+def pose_of(position: Any, quat_xyzw: Any) -> Array:
+    """Pose (4, 4) of a position and an orientation as PyBullet gives them."""
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = rotations(np.array([quat_xyzw]))[0], position
+    return T
 
 
 def _rotation_of_squares() -> Array:

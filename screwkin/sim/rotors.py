@@ -124,7 +124,7 @@ class RelativeRotors:
         """
         linear, angular = look.velocity
         velocity = np.array([*([*angular, *linear] if self._base else ()), *look.qd.tolist()])
-        com, turned = look.com - look.com[0], rotations(look.turned)
+        com, turned = look.com - look.com[0], look.axes
         S = self._twists(com[1:], turned[1:])
         A = S[:3]
         if self._velocity is not None:
