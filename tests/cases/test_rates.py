@@ -1,7 +1,8 @@
 """At every rate that ``send`` accepts, what virtual servos then did passes as a walk of its own.
 
-Verdicts are on the table's servos: commands allow for them, and the virtual ones bend under the plan. Plays are simulated at the lowest accepted rate, at the usual one and at those at which a bus has hardly time
-to read; in MuJoCo, some minutes:
+Verdicts are on the table's servos: commands allow for them, and the virtual ones bend under the plan. Plays
+are simulated at the lowest accepted rate, at the usual one and at those at which a bus has hardly time to
+read; in MuJoCo, some minutes:
 
     python -m pytest -m slow tests/cases/test_rates.py
 """
