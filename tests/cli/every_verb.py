@@ -24,6 +24,7 @@ PACKAGES = {
     "serial": "pyserial",
     "dynamixel_sdk": "dynamixel-sdk",
     "matplotlib": "matplotlib",
+    "viser": "viser",
 }
 """Libraries that an installation may lack, and the packages that hold them."""
 FILES = {
@@ -66,6 +67,8 @@ VERBS = {
     "send": "send walk/trajectory.npz",
     "send --virtual": "send walk/trajectory.npz --virtual --go -o send",
     "validate kinematic": "validate walk/trajectory.npz --engine kinematic -o kinematic",
+    "sweep": "sweep bioloid --gait walk --engine kinematic --set steps=1 --set rate=20 -o sweep",
+    "view": "view linkages/four-bar",
     "workspace": "workspace poppy12 --resolution 0.05 --heights 0.4 -o workspace",
     "stiffness": "stiffness poppy12 --resolution 0.05 --heights 0.4 -k 50 -o stiffness",
     "reproduce": "reproduce paper.toml -o paper",
@@ -91,18 +94,23 @@ NEEDS = {
     "bus configure": ["serial"],
     "bus calibrate": ["serial"],
     "send --virtual": ["dynamixel_sdk", "serial"],  # the driver imports it
+    "view": ["viser"],
     "demo": ["mujoco"],
 }
 VERDICT = {"send", "send --virtual"}
 """What is refused, with exit code 4, where there is no verdict."""
-DRAWING = {"compare", "walk", "validate kinematic", "workspace", "stiffness", "reproduce"}
+DRAWING = {"compare", "sweep", "walk", "validate kinematic", "workspace", "stiffness", "reproduce"}
 """What goes on without pictures, which stand beside its results."""
 
 
 def chosen(absent: Collection[str]) -> dict[str, str]:
-    """The verbs, without pictures where they can be drawn: those take long, and stand in other tests."""
+    """The verbs, without pictures where they can be drawn: those take long, and stand in other tests.
+
+    A viewer that is installed serves until it is stopped: it is left out.
+    """
     plots = "" if "matplotlib" in absent else " --no-plots"
-    return {name: words + plots if name in DRAWING else words for name, words in VERBS.items()}
+    verbs = {name: words for name, words in VERBS.items() if name != "view" or "viser" in absent}
+    return {name: words + plots if name in DRAWING else words for name, words in verbs.items()}
 
 
 def asking(absent: Collection[str]) -> dict[str, str]:
