@@ -1,9 +1,10 @@
-"""python -m benchmarks.robots FILE|FOLDER... [--rows FILE] [--page FILE]: public robots, unedited.
+"""python -m benchmarks.robots FILE|FOLDER... [--again] [--rows FILE] [--page FILE]: public robots, unedited.
 
 Every URDF is read, its limbs, soles and home are found, a gait is fitted to it, and six steps are walked and
 validated in both engines with rigid servos, as ``screwkin walk --auto`` and ``screwkin validate`` do. Each
-row is appended to ``robots.jsonl`` (or --rows) at once; files that stand there are not tried again. --page
-writes the table of all rows as Markdown.
+row is appended to ``benchmarks/results/robots.jsonl`` (or --rows) at once; files that stand there are tried
+again with --again alone, and the last row of a file counts. --unseen marks robots chosen after the rules of
+the search were frozen. --page writes the table of all rows as Markdown.
 """
 
 from __future__ import annotations
@@ -19,7 +20,6 @@ from typing import Any
 import numpy as np
 
 import screwkin as sk
-from benchmarks.environments import ROOT
 from benchmarks.machine import pin_threads
 from screwkin.analysis.engines import Engine
 from screwkin.anatomy.humanoid import anatomy
@@ -30,6 +30,7 @@ from screwkin.ik.closed import recognised
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.choice import closed_mechanism
 
+ROWS = Path(__file__).resolve().parent / "results" / "robots.jsonl"
 STEPS = 6
 POSES = 20
 """Random poses of a leg within its limits, made by its own forward kinematics."""
@@ -46,9 +47,14 @@ def files_of(places: Sequence[Path]) -> Iterator[Path]:
             yield from sorted(p for p in place.rglob("*") if p.suffix.lower() == ".urdf")
 
 
+def file_of(path: Path) -> str:
+    """The end of a path, which tells files apart wherever their repositories lie."""
+    return "/".join(path.parts[-3:])
+
+
 def row_of(path: Path) -> Row:
     """What becomes of one file; the first refusal ends the row."""
-    row: Row = {"file": "/".join(path.parts[-3:]), "path": str(path)}
+    row: Row = {"file": file_of(path)}
     try:
         for part in (_body, _gait):
             part(path, row)
@@ -107,7 +113,8 @@ def _gait(path: Path, row: Row) -> None:
 
 def page_of(rows: Sequence[Row]) -> str:
     """The table of all rows."""
-    walked = [row for row in rows if passed(row)]
+    walked, unseen = [row for row in rows if passed(row)], [row for row in rows if row.get("unseen")]
+    unseen_walk = sum(map(passed, unseen))
     lines = [
         "# Public robots, unedited",
         "",
@@ -116,7 +123,8 @@ def page_of(rows: Sequence[Row]) -> str:
         "on rigid servos. Anatomy: processor time of limbs, soles and home.",
         "Solved: the share of a leg's own random poses within limits that inverse kinematics finds again.",
         "",
-        f"{len(walked)} of {len(rows)} files that were tried walk in both engines.",
+        f"{len(walked)} of {len(rows)} files that were tried walk in both engines. Of the {len(unseen)} with",
+        f"a star, chosen after the rules of the search had been frozen and tried once, {unseen_walk} do.",
         "",
         "| robot | joints | legs, arms | leg IK | solved | anatomy | gait | MuJoCo | PyBullet |",
         "|---|---|---|---|---|---|---|---|---|",
@@ -149,22 +157,30 @@ def _line(row: Row) -> str:
         for e in ENGINES
         if e in verdicts
     ] or [reason, ""]
-    start = [row["file"], str(row.get("joints", "")), f"{legs}, {arms}", row.get("ik", ""), solved]
+    start = [
+        row["file"] + " *" * row.get("unseen", False),
+        str(row.get("joints", "")),
+        f"{legs}, {arms}",
+        row.get("ik", ""),
+        solved,
+    ]
     return "| " + " | ".join([*start, anatomy_s, gait_text, *cells]) + " |"
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("places", nargs="*", type=Path)
-    parser.add_argument("--rows", type=Path, default=ROOT / "robots.jsonl")
+    parser.add_argument("--rows", type=Path, default=ROWS)
+    parser.add_argument("--unseen", action="store_true", help="mark the rows that are made now")
+    parser.add_argument("--again", action="store_true", help="also files that have a row")
     parser.add_argument("--page", type=Path)
     asked = parser.parse_args()
     pin_threads()
     warnings.simplefilter("ignore")
-    done = {row["path"]: row for row in _read(asked.rows)}
+    done = {row["file"]: row for row in read_rows(asked.rows)}
     for path in files_of(asked.places):
-        if str(path) not in done:
-            row = done[str(path)] = row_of(path)
+        if asked.again or file_of(path) not in done:
+            row = done[file_of(path)] = row_of(path) | ({"unseen": True} if asked.unseen else {})
             with asked.rows.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(row) + "\n")
             print(_line(row), flush=True)
@@ -172,9 +188,10 @@ def main() -> None:
         asked.page.write_text(page_of(list(done.values())), encoding="utf-8")
 
 
-def _read(path: Path) -> list[Row]:
+def read_rows(path: Path) -> list[Row]:
+    """The last row of every file; none where there is no such list."""
     lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
-    return [json.loads(line) for line in lines]
+    return list({row["file"]: row for row in map(json.loads, lines)}.values())
 
 
 if __name__ == "__main__":

@@ -1,13 +1,12 @@
-"""python -m benchmarks.strip ROWS [-o PICTURE] [--across N]: the robots of ``benchmarks.robots`` that walk.
+"""python -m benchmarks.strip FILE|FOLDER... [--rows FILE] [-o PICTURE] [--across N]: robots that walk.
 
-Every robot whose row says that it walks in both engines is fitted and planned anew, and drawn in the middle
-of its second swing, with the meshes of its URDF.
+Every robot whose row of ``benchmarks.robots`` says that it walks in both engines is fitted and planned anew,
+and drawn in the middle of its second swing, with the meshes of its URDF.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,7 +16,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 import screwkin as sk
 from benchmarks.machine import pin_threads
-from benchmarks.robots import Row, passed
+from benchmarks.robots import ROWS, file_of, files_of, passed, read_rows
 from screwkin.anatomy.humanoid import humanoid
 from screwkin.sim.camera import Camera, Picture
 from screwkin.sim.render import pictures
@@ -27,9 +26,8 @@ WIDTH, HEIGHT, LINE = 200, 260, 20
 """Of a picture and of the name below it [pixels]."""
 
 
-def picture_of(path: Path) -> Picture:
+def picture_of(robot: sk.Robot) -> Picture:
     """A robot in the middle of its second swing."""
-    robot = humanoid(sk.load_robot(path))
     walk = sk.walk(robot, sk.fitting_gait(robot), 2)
     start, end = walk.meta["boundaries"][1:3]
     swinging = np.flatnonzero(~walk.contact.all(axis=1))
@@ -41,29 +39,31 @@ def picture_of(path: Path) -> Picture:
     return pictures(robot, walk.time[at], walk.T_world_base[at], walk.q[at], camera)[0]
 
 
-def strip(rows: Sequence[Row], across: int) -> Image.Image:
+def strip(files: Sequence[Path], across: int) -> Image.Image:
     """Pictures side by side, so many in a line, with names and masses."""
-    lines = -(-len(rows) // across)
+    lines = -(-len(files) // across)
     whole = Image.new("RGB", (across * WIDTH, lines * (HEIGHT + LINE)), "white")
     draw, font = ImageDraw.Draw(whole), ImageFont.load_default(13)
-    for k, row in enumerate(rows):
+    for k, path in enumerate(files):
+        robot = humanoid(sk.load_robot(path))
         x, y = k % across * WIDTH, k // across * (HEIGHT + LINE)
-        whole.paste(Image.fromarray(picture_of(Path(row["path"]))), (x, y))
-        text = f"{row['name']}, {row['mass']:.0f} kg"
+        whole.paste(Image.fromarray(picture_of(robot)), (x, y))
+        text = f"{robot.name}, {float(robot.mass):.0f} kg"
         draw.text((x + WIDTH / 2, y + HEIGHT + LINE / 2), text, fill="black", font=font, anchor="mm")
     return whole
 
 
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.strip", description=__doc__)
-    parser.add_argument("rows", type=Path, help="written by python -m benchmarks.robots --rows")
+    parser.add_argument("places", nargs="+", type=Path)
+    parser.add_argument("--rows", type=Path, default=ROWS)
     parser.add_argument("-o", "--output", type=Path, default=PICTURE)
     parser.add_argument("--across", type=int, default=5, help="pictures in a line")
     asked = parser.parse_args(arguments)
     pin_threads()
     warnings.simplefilter("ignore")
-    rows = [json.loads(line) for line in asked.rows.read_text(encoding="utf-8").splitlines()]
-    whole = strip([row for row in rows if passed(row)], asked.across)
+    walking = {row["file"] for row in read_rows(asked.rows) if passed(row)}
+    whole = strip([path for path in files_of(asked.places) if file_of(path) in walking], asked.across)
     whole.quantize(128).save(asked.output, optimize=True)
     print(asked.output)
     return 0
