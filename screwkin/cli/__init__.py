@@ -37,6 +37,7 @@ VERBS = {
     "codegen": "A robot's formulas as C, for other programs and microcontrollers.",
     "send": "Play a validated trajectory to the servos; a dry run unless --go.",
     "bus": "Servos on a bus, or virtual ones: screwkin bus --help lists the verbs.",
+    "doctor": "What of screwkin works on this computer: libraries, engines, compiler, cache, ports.",
     "reproduce": "Every table and figure of a paper, its value beside ours.",
 }
 

@@ -38,6 +38,7 @@ def test_the_bar_is_drawn_on_a_terminal_only(monkeypatch):
         with progress_bar("walk [1/2]") as done:
             done(0.5)
         assert ("walk [1/2]" in stream.getvalue()) == drawn
+        assert ("50%" in stream.getvalue()) == drawn
         assert bool(stream.getvalue()) == drawn
 
 
