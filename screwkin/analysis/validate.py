@@ -23,15 +23,18 @@ from screwkin.analysis.engines import (
     servo_for,
 )
 from screwkin.analysis.verdict import Criteria, Measured, fallen_again, reasons_of
+from screwkin.compiler.run import compile_program
 from screwkin.errors import InputError
 from screwkin.files import text_sha256
 from screwkin.gait.balance import zmp as balance_of
 from screwkin.gait.compensation import stiffness_of, way_of
 from screwkin.gait.ground import ground_of
 from screwkin.gait.intended import intended
+from screwkin.gait.stabilised import stabilised
 from screwkin.kinematics.limits import limited_joints
 from screwkin.model.robot import Robot, robot_text
 from screwkin.sim.camera import Camera, Picture
+from screwkin.sim.feedback import Loop, Senses, WalkController
 from screwkin.sim.measure import Slip, ZmpRecord, slip, speed_use, torque_use, zmp_record
 from screwkin.sim.perturbation import NONE, Perturbation
 from screwkin.sim.render import pictures
@@ -74,6 +77,7 @@ def validate(
     motion: Trajectory | None = None,
     check_solver: bool = False,
     perturbation: Perturbation = NONE,
+    feedback: bool = False,
 ) -> Validation:
     """Play the trajectory in a simulator and judge what happened.
 
@@ -96,6 +100,8 @@ def validate(
         check_solver: simulate at half the step and at twice the iterations too; a verdict that this changes,
             or that lies within what it changes, is undecided and has not passed.
         perturbation: what differs from the plan in the simulation; the plan stays what it is judged by.
+        feedback: walk the plan's steps with the stabiliser (``gait.stabilised``), which feels attitude,
+            joints and feet, in place of its recorded commands.
 
     Returns:
         Validation: ``passed``, ``reasons`` and what was measured.
@@ -118,7 +124,10 @@ def validate(
     by_itself = AUTO if motion is None else RIGID
     on = servo_for(by_itself if servo == AUTO else servo, robot, trajectory, engine, wanted)
     compliance = wanted.on(on).for_trajectory(robot, trajectory)
-    commands = motion or compliance.commands(robot, trajectory)
+    walk = stabilised(robot, trajectory) if feedback else None
+    if walk is not None:
+        compile_program(walk.program)
+    commands = motion or (trajectory if feedback else compliance.commands(robot, trajectory))
     start = (motion or intended(robot, trajectory)).q[0]
     names, terrain = engines_for(engine, robot, compliance), ground_of(trajectory)
     ways = _FINER if check_solver and names != ("kinematic",) else {"usual": Refinement()}
@@ -127,6 +136,9 @@ def validate(
 
     def played(name: Engine, finer: Refinement) -> Validation:
         nonlocal done
+        loop = None
+        if walk is not None:
+            loop = Loop(WalkController(walk), Senses(robot, perturbation, walk.body.tips))
         backend = opened(robot, name, compliance, gui and not done, finer, terrain, perturbation)
         try:
             run = simulate(
@@ -137,6 +149,7 @@ def validate(
                 lambda share: report(first * (done + share)),
                 start,
                 perturbation,
+                loop,
             )
         finally:
             backend.close()
@@ -299,6 +312,8 @@ def _warnings(robot: Robot, trajectory: Trajectory, run: Run, slipped: Slip, spe
     ]
     if fast:
         warnings.append(f"planned joint speed above the servo's: {', '.join(fast)}")
+    if "feedback" in run.settings:
+        warnings.append("walked with feedback, not the recorded commands; send refuses this verdict")
     if "perturbation" in run.settings:
         warnings.append("simulated in a world other than the planned one; send refuses this verdict")
     if run.touched:

@@ -181,6 +181,8 @@ def contradictions(verdict: Verdict) -> tuple[str, ...]:
     tilted = verdict.max_tilt_deg > np.rad2deg(Criteria().schedule.fallen_tilt)
     fallen = [f"tilted by {verdict.max_tilt_deg:.0f} deg, and not fallen"] if tilted else []
     others = ["undecided"] if verdict.undecided else []
+    if any("feedback" in settings for settings in verdict.engine_settings.values()):
+        others.append("walked with feedback (--feedback), not the recorded commands")
     if any("perturbation" in settings for settings in verdict.engine_settings.values()):
         others.append("simulated in a world that is not the planned one (--perturb)")
     for name in verdict.engine.split("+"):

@@ -32,9 +32,9 @@ FEWEST, MOST = 30, 120
 class Wish:
     """What a simulation is to be: engine, a window, a film, pictures and page; commands for the page.
 
-    check_solver, servo, compliance, perturbation: see ``validate``. motion: what the joints do instead of the
-    trajectory; criteria: what a walk must satisfy; more: what follows once the verdict is written; it returns
-    what draws more pictures.
+    check_solver, servo, compliance, perturbation, feedback: see ``validate``. motion: what the joints do
+    instead of the trajectory; criteria: what a walk must satisfy; more: what follows once the verdict is
+    written; it returns what draws more pictures.
     """
 
     engine: str = "auto"
@@ -46,6 +46,7 @@ class Wish:
     compliance: SimulatedCompliance = field(default_factory=SimulatedCompliance)
     perturbation: Perturbation = NONE
     servo: str = AUTO
+    feedback: bool = False
     motion: Trajectory | None = None
     criteria: Criteria | None = None
     more: Callable[[Validation], Callable[[], Sequence[Saved]]] = lambda check: tuple
@@ -80,6 +81,7 @@ def simulate_to_files(account: Account, folder: Path, verdict: Path, wish: Wish)
             motion=wish.motion,
             check_solver=wish.check_solver,
             perturbation=wish.perturbation,
+            feedback=wish.feedback,
         )
     remove_reports(folder)
     with atomic_write(verdict) as file:

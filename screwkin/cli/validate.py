@@ -67,6 +67,10 @@ def validate(
         typer.Option("--check-solver", help="Also at half the step and twice the iterations."),
     ] = False,
     perturb: Perturbed = None,
+    feedback: Annotated[
+        bool,
+        typer.Option("--feedback", help="Walk its steps with the stabiliser, by what the robot feels."),
+    ] = False,
     plots: Annotated[bool, typer.Option(help="Draw the pictures and write the report.")] = True,
     log: Annotated[
         Path | None,
@@ -83,10 +87,10 @@ def validate(
     engine_named(engine)
     compliance = _compliance(compliant, k, sole_stiffness, repeat, servo)
     if log is not None:
-        if compliance != SimulatedCompliance() or servo != AUTO or perturb:
+        if compliance != SimulatedCompliance() or servo != AUTO or perturb or feedback:
             raise InputError(
-                "--log replays servos that moved; it goes without --servo, --compliant, --sole-stiffness and "
-                "--perturb"
+                "--log replays servos that moved; it goes without --servo, --compliant, --sole-stiffness, "
+                "--perturb and --feedback"
             )
         return replay(trajectory, log, Wish(engine, check_solver, gui, video, plots), output, as_json)
     by = perturbation_of(perturb or [])
@@ -101,11 +105,12 @@ def validate(
         str(trajectory),
         *_changes(engine, servo, compliance, k),
         *(["--check-solver"] * check_solver),
+        *(["--feedback"] * feedback),
         *(word for text in described(by) for word in ("--perturb", text)),
         *(["--video"] * video),
     ]
     commands = _commands(str(loaded.meta.get("command", "")), words)
-    wish = Wish(engine, check_solver, gui, video, plots, commands, compliance, by, servo)
+    wish = Wish(engine, check_solver, gui, video, plots, commands, compliance, by, servo, feedback)
     with output_folder(output or beside, "validate", account.robot.name) as folder:
         check = simulate_to_files(account, folder, beside / "validation.json", wish)
     if as_json:

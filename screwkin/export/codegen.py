@@ -17,6 +17,7 @@ from screwkin.compliance import deflection
 from screwkin.dynamics.margin import margin
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.export.quantities import QUANTITIES, programs
+from screwkin.gait.stabilised import cycle_in_a_step, stabiliser_of
 from screwkin.ik import programs as limbs
 from screwkin.ik.closed import recognised
 from screwkin.kinematics.mass import GRAVITY
@@ -58,6 +59,7 @@ KINDS: Mapping[str, Callable[[Robot], list[Program]]] = {
     "ik": _closed_limbs,
     "margin": lambda robot: [margin(robot)],
     "deflection": _deflections,
+    "stabiliser": lambda robot: [stabiliser_of(robot)],
 }
 """What can be asked for: quantities, and what algorithms are made of."""
 
@@ -113,6 +115,8 @@ def example(robot: Robot, program: Program) -> dict[str, Array]:
     }
     sample["stiffness"] = np.linspace(40.0, 80.0, len(home))
     sample["contact"] = np.ones(len({sole.limb for sole in robot.soles}))
+    if program.name == identifier(robot.name, "stabiliser"):
+        return cycle_in_a_step(robot)
     D = link_displacements(robot, q.tolist())
     for limb in robot.limbs:
         pose = as_array(pose_in_base(robot, D, limb.tip))

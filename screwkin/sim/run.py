@@ -19,6 +19,7 @@ from screwkin.mechanism.holds import on_floor
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
 from screwkin.sim.backend import Backend, Command, Observation
+from screwkin.sim.feedback import Loop
 from screwkin.sim.perturbation import NONE, Perturbation
 from screwkin.trajectory import Trajectory
 
@@ -84,6 +85,7 @@ def simulate(
     progress: Callable[[float], None] | None = None,
     start: Array | None = None,
     perturbation: Perturbation = NONE,
+    loop: Loop | None = None,
 ) -> Run:
     """Play a trajectory in a backend, which stays open.
 
@@ -99,6 +101,7 @@ def simulate(
         start: positions (n,) of the joints at first, by default the first commands. Commands that allow for
             elastic servos are no posture: in them feet would stand in the floor, which throws the robot up.
         perturbation: of which the push is given here; the backend has the rest.
+        loop: what commands the joints from the start on instead, by what the robot feels.
     """
     rule = schedule or Schedule()
     dt, since = backend.dt, float(trajectory.time[0])
@@ -108,7 +111,7 @@ def simulate(
     q, _ = trajectory.sampled(times)
     planned = trajectory.base_sampled(times)
     qd = np.diff(q, axis=0) / dt
-    backend.reset(State(planned[0], q[0] if start is None else start))
+    first = backend.reset(State(planned[0], q[0] if start is None else start))
     watched = _watched(robot, State(planned[0], q[0]), terrain)
     low = rule.fallen_height * terrain.above_plane(_carried(planned, watched))
     upright = math.cos(rule.fallen_tilt)
@@ -116,6 +119,8 @@ def simulate(
     fallen_at: float | None = None
     for k in range(count):
         force = perturbation.force(float(times[k]), dt)
+        if loop is not None and since - 1e-9 <= times[k]:
+            q[k], qd[k] = loop.command(seen[-1] if seen else first, dt)
         backend.step(Command(q[k], qd[k], planned[k + 1], force))
         seen.append(backend.observe())
         now = float(times[k + 1])
@@ -131,7 +136,7 @@ def simulate(
     return Run(
         engine=backend.name,
         servo=backend.servo,
-        settings=dict(backend.settings),
+        settings=dict(backend.settings) | ({} if loop is None else {"feedback": loop.noted()}),
         dt=dt,
         time=times[1 : rows + 1],
         planned_base=planned[1 : rows + 1],

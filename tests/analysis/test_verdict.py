@@ -96,6 +96,7 @@ SPEAKS_AGAINST = [
     ({"slip_mm": -1.0}, "slip_mm is -1, below 0"),
     ({"max_tilt_deg": 80.0}, "tilted by 80 deg"),
     ({"repeated": {}}, "falls in None"),
+    ({"engine_settings": {"mujoco": {"feedback": {}}}}, "recorded commands"),
     ({"engine_settings": {"mujoco": {"perturbation": {"push": [0, 0, 1.0]}}}}, "not the planned one"),
     ({"repeated": {"fallen": 1, "runs": 4}}, "falls in 1 of 4"),
 ]

@@ -19,6 +19,7 @@ SETS = [
     ("poppy12", "ik,motion,com,zmp", "double"),
     ("poppy12", "ik,motion,com,zmp", "float"),
     ("poppy12", "deflection", "float"),
+    ("bioloid", "stabiliser", "double"),
     ("poppy12", "links,jacobian,mass_matrix,inverse_dynamics", "double"),
 ]
 FLAGS = ("-DSCREWKIN_PACKS", "-march=native", "-DSCREWKIN_SCALAR")

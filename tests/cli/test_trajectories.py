@@ -328,3 +328,12 @@ def test_a_checked_solver_says_what_its_finer_settings_change(cli, walked, tmp_p
     assert settings["passed"] == {"usual": True, "half the step": True, "twice the iterations": True}
     low, high = settings["spread"]["zmp_rms_mm"]
     assert high - low < 1.0
+
+
+def test_feedback_is_refused_for_what_it_cannot_walk_and_with_a_log(cli, refused, walked, tmp_path):
+    (tmp_path / "t.npz").write_bytes((walked / "trajectory.npz").read_bytes())
+    assert "of kind preview or footsteps, not" in refused(
+        cli("validate", "t.npz", "--feedback", "--engine", "mujoco"), 2
+    )
+    assert "without" in refused(cli("validate", "t.npz", "--feedback", "--log", "play.npz"), 2)
+    assert [path.name for path in tmp_path.iterdir()] == ["t.npz"]

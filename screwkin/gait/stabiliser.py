@@ -1,0 +1,393 @@
+"""A stabilised walk, cycle by cycle: state and senses in, state and joint positions out; no simulator in it.
+
+A cycle is one formula over scalars: plain numbers, or a straight-line program in C (``stabiliser_program``).
+It knows what a robot knows: attitude by an IMU, joint positions, force cells in the feet where there are any,
+and steps to take. The CoM follows from the attitude and the legs' kinematics, on the foot that stands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from screwkin.algebra.scalar import Scalar, arc, atan2, cos, larger, sin, sqrt, where
+from screwkin.algebra.se3 import Pose, Rotation, Vector, X, Y, Z, leaves, rotate
+from screwkin.gait.stabiliser_law import (
+    Gains,
+    Landing,
+    Pair,
+    Rhythm,
+    clipped,
+    either,
+    first_shift,
+    landing,
+    minus,
+    nominal_place,
+    pendulum,
+    plus,
+    progress,
+    raised,
+    stopping_zmp,
+    turned,
+    within,
+)
+from screwkin.ik.closed import ClosedForm, closed_form
+from screwkin.kinematics.landmarks import waist_frame
+from screwkin.kinematics.mass import mass_center
+from screwkin.kinematics.positions import link_displacements, pose_in_base
+from screwkin.kinematics.serial_chain import SerialChain
+from screwkin.model.robot import Robot
+
+Place = tuple[Scalar, Scalar, Scalar]
+"""x, y, yaw of a foot on the floor."""
+STARTING, STEPPING, STOPPING = 0.0, 1.0, 2.0
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What a stabiliser knows from one cycle to the next; scalars, in the order in which arrays hold them.
+
+    mode: starting, stepping or stopping; tau: time in it [s]; period: of the step in course [s]; side: of the
+    foot that stands, +1 left; stance, other: feet on the floor, the other one where it stood at last (x, y
+    [m], yaw [rad]); com, rate, zmp: of the internal pendulum; held, place: see ``landing``; seen: 1 if the
+    cycle before measured; gap, gap_rate: of the CoM from the pendulum, measured; error: of the DCM; slope,
+    lean: of the floor and of the trunk beside it, about x and y [rad]; waist: x, y.
+    """
+
+    mode: Scalar
+    tau: Scalar
+    period: Scalar
+    side: Scalar
+    stance: Place
+    other: Place
+    com: Pair
+    rate: Pair
+    zmp: Pair
+    held: Pair
+    place: Pair
+    seen: Scalar
+    gap: Pair
+    gap_rate: Pair
+    error: Pair
+    slope: Pair
+    lean: Pair
+    waist: Pair
+
+
+@dataclass(frozen=True)
+class Senses:
+    """What a robot feels: turn of its base against the vertical (any heading), and joint positions [rad].
+
+    By foot, right and left: vertical force [N] and centre of pressure in the tip's axes [m]. Without force
+    cells the force is 1 on both feet and the pressure in the middle of the sole.
+    """
+
+    attitude: Rotation
+    q: Sequence[Scalar]
+    force: Pair
+    pressure: tuple[Pair, Pair]
+
+
+@dataclass(frozen=True)
+class Ahead:
+    """Steps to come: displacements (forward, left, turn) of the step in course and of the next.
+
+    more: how many follow the one in course; height: of the waist now [m].
+    """
+
+    steps: tuple[Place, Place]
+    more: Scalar
+    height: Scalar
+
+
+@dataclass(frozen=True, eq=False)
+class Leg:
+    """A leg by its closed form, bent in the one way of a branch's number."""
+
+    form: ClosedForm
+    branch: int
+
+    @classmethod
+    def of(cls, chain: SerialChain, T_base_tip: Pose, q: Sequence[float]) -> Leg:
+        """A leg bent as in a posture q, which has its tip at that pose."""
+        form = closed_form(chain)
+        own = np.array([q[i] for i in chain.joints], dtype=float)
+        branches = np.array([branch[:-1] for branch in form.formula(T_base_tip)], dtype=float)
+        return cls(form, int(np.argmin((1.0 - np.cos(branches - own)).sum(axis=1))))
+
+    @property
+    def joints(self) -> list[int]:
+        """Its joints, by their number in the robot."""
+        return list(self.form.chain.joints)
+
+    def positions(self, T_base_tip: Pose) -> Sequence[Scalar]:
+        """Joint positions, within half a turn of zero; out of reach, stretched."""
+        return [arc(sin(x), cos(x)) for x in self.form.formula(T_base_tip)[self.branch][:-1]]
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A robot with two legs that closed forms solve: right and left."""
+
+    robot: Robot
+    legs: tuple[Leg, Leg]
+    tips: tuple[str, str]
+    T_waist_base: Pose
+    share: Scalar
+
+    def center(self, q: Sequence[Scalar]) -> Vector:
+        """CoM in the base frame."""
+        return mass_center(self.robot, link_displacements(self.robot, q))
+
+    def posture(self, waist: Pose, feet: Sequence[Pose], rest: Sequence[Scalar]) -> list[Scalar]:
+        """Joint positions for a waist and soles in the world; other joints rest."""
+        base, q = (waist @ self.T_waist_base).inverse, list(rest)
+        for leg, foot in zip(self.legs, feet, strict=True):
+            for joint, x in zip(leg.joints, leg.positions(base @ foot), strict=True):
+                q[joint] = x
+        return q
+
+
+def body_of(robot: Robot, right: str, left: str, share: Scalar) -> Body:
+    """The body of a robot.
+
+    Args:
+        robot: with a posture ``home``, whose legs bend as they do there.
+        right: tip of the right foot.
+        left: tip of the left foot.
+        share: by how much the CoM moves with the waist while the feet stay.
+
+    Raises:
+        InputError: a leg has no closed form.
+    """
+    q = list(robot.posture("home").q)
+    D = link_displacements(robot, q)
+    first, second = (
+        Leg.of(SerialChain.of(robot, tip), pose_in_base(robot, D, tip), q) for tip in (right, left)
+    )
+    return Body(robot, (first, second), (right, left), waist_frame(robot).inverse, share)
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """The CoM on the floor as measured; attitude with the plan's heading; whether it holds."""
+
+    com: Pair
+    attitude: Rotation
+    valid: Scalar
+
+
+def _measured(body: Body, rhythm: Rhythm, memory: Memory, senses: Senses, swings: Scalar) -> _Seen:
+    """Where the CoM is, by the foot that bears: the stance foot, or the other where that is in the air."""
+    D = link_displacements(body.robot, senses.q)
+    com = senses.attitude @ mass_center(body.robot, D)
+    left = memory.side > 0.0
+    feet = [pose_in_base(body.robot, D, tip) for tip in body.tips]
+    views = [
+        [*_column(senses.attitude @ foot.R.x), *_column(senses.attitude @ foot.R.y),
+         *_column(senses.attitude @ foot.p), *pressure, force]
+        for foot, pressure, force in zip(feet, senses.pressure, senses.force, strict=True)
+    ]  # fmt: skip
+    stance, other = either(left, views[1], views[0]), either(left, views[0], views[1])
+    aloft = (stance[-1] < 0.25 * (stance[-1] + other[-1])) & (other[-1] > 0.0)
+    xx, xy, xz, yx, yy, yz, px, py, pz, kx, ky, _ = either(aloft, other, stance)
+    at = either(aloft, memory.other, memory.stance)
+    outward = where(aloft, -memory.side, memory.side) * rhythm.middle[1]
+    (hx, hy), mx = rhythm.half, rhythm.middle[0]
+    k = within((kx, ky), (mx - hx, outward - hy), (mx + hx, outward + hy))
+    pivot = Vector(px + xx * k[0] + yx * k[1], py + xy * k[0] + yy * k[1], pz + xz * k[0] + yz * k[1])
+    # Turn about the vertical from the IMU's heading to the plan's.
+    size = sqrt(xx * xx + xy * xy)
+    ch, sh, cf, sf = xx / size, xy / size, cos(at[2]), sin(at[2])
+    c, s = cf * ch + sf * sh, sf * ch - cf * sh
+    turn = Rotation(Vector(c, s, 0), Vector(-s, c, 0), Z)
+    arm = turn @ (com - pivot)
+    place = plus(plus((at[0], at[1]), turned(k, at[2])), (arm.x, arm.y))
+    return _Seen(place, turn @ senses.attitude @ body.T_waist_base.R.T, where(swings & aloft, 0.0, 1.0))
+
+
+def _column(v: Vector) -> tuple[Scalar, Scalar, Scalar]:
+    return v.x, v.y, v.z
+
+
+@dataclass(frozen=True, eq=False)
+class Walker:
+    """What is constant in a stabilised walk: the robot's body, the walk and how it is stabilised."""
+
+    body: Body
+    rhythm: Rhythm
+    gains: Gains
+
+
+def _estimated(
+    rhythm: Rhythm, gains: Gains, memory: Memory, seen: _Seen
+) -> tuple[Pair, Pair, Pair, Pair, Pair]:
+    """Gap, its rate and the DCM's error; slope and lean: all filtered."""
+    good, dt = seen.valid > 0.5, rhythm.dt
+    gap = minus(seen.com, memory.com)
+    old = either(memory.seen > 0.5, memory.gap, gap)
+    speed = within(((gap[0] - old[0]) / dt, (gap[1] - old[1]) / dt), (-0.6, -0.6), (0.6, 0.6))
+    rate = plus(memory.gap_rate, minus(speed, memory.gap_rate), gains.rate_filter)
+    far = gains.largest
+    error = within(plus(gap, rate, 1.0 / rhythm.w), (-far, -far), (far, far))
+    R = seen.attitude
+    about = atan2(-R.z.y, R.z.z), atan2(R.z.x, R.z.z)
+    bounded = within(about, (-0.1, -0.1), (0.1, 0.1))
+    slope = plus(memory.slope, minus(bounded, memory.slope), dt / gains.level_time)
+    beside = within(minus(about, slope), (-0.25, -0.25), (0.25, 0.25))
+    lean = plus(memory.lean, minus(beside, memory.lean), gains.lean_filter)
+    news, olds = (
+        (gap, rate, error, slope, lean),
+        (memory.gap, memory.gap_rate, memory.error, memory.slope, memory.lean),
+    )
+    gap, rate, error, slope, lean = (_pair(either(good, new, o)) for new, o in zip(news, olds, strict=True))
+    return gap, rate, error, slope, lean
+
+
+def _pair(two: Sequence[Scalar]) -> Pair:
+    return two[0], two[1]
+
+
+def cycle(
+    walker: Walker, memory: Memory, senses: Senses, ahead: Ahead, q: Sequence[Scalar], feedback: Scalar
+) -> tuple[Memory, list[Scalar], Scalar]:
+    """One cycle: the memory after it, joint positions to command, and 1 if a foot landed in it, else 0.
+
+    Args:
+        walker: what is constant.
+        memory: of the cycle before.
+        senses: what is felt now.
+        ahead: steps to come; after a landing they are those from the next on.
+        q: joint positions commanded in the cycle before; joints that are no legs' stay there.
+        feedback: 1 with senses, 0 without: the same walk, open loop.
+    """
+    rhythm, gains = walker.rhythm, walker.gains
+    w, dt = rhythm.w, rhythm.dt
+    starting, stepping = memory.mode < 0.5, (memory.mode > 0.5) & (memory.mode < 1.5)
+    swings = stepping & (memory.tau > 0.5 * rhythm.both)
+    seen = _measured(walker.body, rhythm, memory, senses, swings)
+    seen = _Seen(seen.com, seen.attitude, seen.valid * feedback)
+    gap, gap_rate, error, slope, lean = _estimated(rhythm, gains, memory, seen)
+    pulls = where(starting, 0.0, seen.valid) * w
+    rate = tuple(v + pulls * k * e for v, k, e in zip(memory.rate, gains.pull, error, strict=True))
+    origin, yaw = (memory.stance[0], memory.stance[1]), memory.stance[2]
+    dcm = turned(minus(plus(memory.com, _pair(rate), 1.0 / w), origin), -yaw)
+    beside = turned(minus(_pair(memory.other), origin), -yaw)
+    stood = turned(minus(memory.zmp, origin), -yaw)
+    decided = landing(rhythm, gains, memory, dcm, stood, [step[:2] for step in ahead.steps], feedback)
+    now = _now(rhythm, memory, decided, starting, stepping, ahead)
+    there = plus(now.place_before, turned((rhythm.middle[0], now.side * rhythm.middle[1]), ahead.steps[0][2]))
+    at_rest = either(starting, first_shift(rhythm, memory, dcm, beside), stopping_zmp(rhythm, dcm, beside))
+    zmp = either(stepping, either(now.lands, there, decided.zmp), at_rest)
+    ease = where(stepping, dt / larger(rhythm.both - now.tau, dt), 0.3)
+    zmp = plus(memory.zmp, minus(plus(origin, turned(_pair(zmp), yaw)), memory.zmp), ease)
+    com, rate = pendulum(memory.com, _pair(rate), zmp, w, dt)
+    share = where(stepping & ~now.lands, now.share, 0.0)
+    swing = _swing(rhythm, gains, now, share, _pair(lean), feedback)
+    waist, joints = _whole(walker.body, ahead.height, now, swing, com, memory.waist, q)
+    after = Memory(
+        now.mode, now.tau + dt, now.period, now.side, now.stance, now.other, com, rate, zmp, decided.held,
+        now.place, seen.valid, gap, gap_rate, error, slope, lean, waist,
+    )  # fmt: skip
+    return after, joints, where(now.lands, 1.0, 0.0)
+
+
+@dataclass(frozen=True)
+class _Now:
+    """The walk after this cycle's decisions; share: of the swing's time that has passed."""
+
+    mode: Scalar
+    tau: Scalar
+    period: Scalar
+    side: Scalar
+    stance: Place
+    other: Place
+    place: Pair
+    place_before: Pair
+    turn: Scalar
+    turned: Scalar
+    share: Scalar
+    lands: Scalar
+
+
+def _now(
+    rhythm: Rhythm, memory: Memory, decided: Landing, starting: Scalar, stepping: Scalar, ahead: Ahead
+) -> _Now:
+    """Feet, mode and time: a step begins after the first shift of weight, and where a foot lands."""
+    first, second = ahead.steps
+    tau, yaw, side = memory.tau, memory.stance[2], memory.side
+    lands = stepping & (tau >= decided.period - 1e-9)
+    begins = starting & (tau >= rhythm.beginning - 1e-9)
+    anew = lands | begins
+    spot = turned(decided.place, yaw)
+    landed = (memory.stance[0] + spot[0], memory.stance[1] + spot[1], yaw + first[2])
+    mode = where(begins, STEPPING, where(lands, where(ahead.more > 0.5, STEPPING, STOPPING), memory.mode))
+    place = either(stepping, decided.place, memory.place)
+    place = either(begins, nominal_place(rhythm, side, first), place)
+    place = either(lands, nominal_place(rhythm, -side, second), place)
+    T, both = rhythm.period, rhythm.both
+    share = clipped((tau - 0.5 * both) / larger(decided.period - both, 1e-3), 0.0, 1.0)
+    going = where(stepping & ~lands, progress(share), 0.0)
+    stance, other = either(lands, landed, memory.stance), either(lands, memory.stance, memory.other)
+    apart = other[2] - stance[2] + going * (stance[2] + first[2] - other[2])
+    period = where(anew, T, where(stepping, decided.period, memory.period))
+    return _Now(
+        mode=mode,
+        tau=where(anew, 0.0, tau),
+        period=period,
+        side=where(lands, -side, side),
+        stance=_place(stance),
+        other=_place(other),
+        place=_pair(place),
+        place_before=decided.place,
+        turn=first[2],
+        turned=apart,
+        share=share,
+        lands=lands,
+    )
+
+
+def _swing(rhythm: Rhythm, gains: Gains, now: _Now, share: Scalar, lean: Pair, feedback: Scalar) -> Pose:
+    """Sole of the other foot on the floor: on its way, and turned about the stance foot against the lean."""
+    x, y, yaw = now.stance
+    spot = turned(now.place, yaw)
+    goal = (x + spot[0], y + spot[1], yaw + now.turn)
+    gone = progress(share)
+    at = [a + (b - a) * gone for a, b in zip(now.other, goal, strict=True)]
+    sole = Pose(rotate(Z, at[2]), Vector(at[0], at[1], rhythm.lift * raised(share)))
+    answer = gains.lean * feedback * clipped(10.0 * share, 0.0, 1.0)
+    against = (rotate(X, answer * lean[0]) @ rotate(Y, answer * lean[1])).T
+    pivot = Vector(x, y, 0.0)
+    return Pose(against @ sole.R, pivot + against @ (sole.p - pivot))
+
+
+def _whole(
+    body: Body, height: Scalar, now: _Now, swing: Pose, com: Pair, waist: Pair, q: Sequence[Scalar]
+) -> tuple[Pair, list[Scalar]]:
+    """Waist and joint positions that bring the CoM over the pendulum: one step of Newton's method a cycle."""
+    x, y, yaw = now.stance
+    stance = Pose(rotate(Z, yaw), Vector(x, y, 0.0))
+    heading = yaw + 0.5 * now.turned
+    left = now.side > 0.0
+    feet = [_either_pose(left, swing, stance), _either_pose(left, stance, swing)]
+
+    def frame(at: Pair) -> Pose:
+        return Pose(rotate(Z, heading), Vector(at[0], at[1], height))
+
+    near = body.posture(frame(waist), feet, q)
+    center = frame(waist) @ body.T_waist_base @ body.center(near)
+    error = minus(com, (center.x, center.y))
+    moved = within((error[0] / body.share, error[1] / body.share), (-0.01, -0.01), (0.01, 0.01))
+    waist = plus(waist, moved)
+    return waist, body.posture(frame(waist), feet, near)
+
+
+def _either_pose(condition: Scalar, a: Pose, b: Pose) -> Pose:
+    x = either(condition, leaves(a), leaves(b))
+    return Pose(Rotation(Vector(*x[0:3]), Vector(*x[3:6]), Vector(*x[6:9])), Vector(*x[9:12]))
+
+
+def _place(three: Sequence[Scalar]) -> Place:
+    return three[0], three[1], three[2]

@@ -1,0 +1,367 @@
+"""The law of a stabilised walk: a pendulum, pulled to the measured one, and where it lets a foot land.
+
+The pendulum stands on the internal ZMP; xi = c + c'/w is its divergent component of motion (DCM), with
+w^2 = g/h. What the real robot does beside it pulls it, at once: the pendulum is what the legs follow, so the
+plan goes to the robot and not the robot to the plan. Then, in this order: the ZMP moves within the sole, the
+step is taken sooner or later, and the foot lands elsewhere.
+
+Everything is in the axes of the stance foot; lengths in m, times in s. Scalars of any kind.
+Source: Englsberger, Ott, Albu-Schaeffer (2015), the DCM and its shift per step; Khadiv et al. (2020), place
+and time of a step together; Kajita et al. (2010), the pull of the model to the robot.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any, Protocol, TypeVar
+
+from screwkin.algebra.scalar import Scalar, cos, larger, least, sin, sqrt, where
+from screwkin.kinematics.mass import GRAVITY
+
+Pair = tuple[Scalar, Scalar]
+T = TypeVar("T")
+HALVINGS = 5
+TERMS = 14
+APART = 0.004
+"""Between the soles [m], at least."""
+QUICK = 0.012
+"""By how much a landing place moves in a cycle [m], at most."""
+LATE = 0.85
+"""Share of a swing from which the landing place stays."""
+MOMENT = 0.03
+"""Before a landing from which its time stays [s]."""
+
+
+def clipped(x: Scalar, low: Scalar, high: Scalar) -> Scalar:
+    """x, or the nearer end of [low, high]."""
+    return least(larger(x, low), high)
+
+
+def exponential(x: Scalar) -> Scalar:
+    """e^x of |x| up to 16, to 1e-13: a series of x/32, squared five times."""
+    small = x * 2.0**-HALVINGS
+    total: Scalar = 1.0
+    for k in range(TERMS, 0, -1):
+        total = 1.0 + total * small * (1.0 / k)
+    for _ in range(HALVINGS):
+        total = total * total
+    return total
+
+
+def logarithm(x: Scalar) -> Scalar:
+    """ln x of x within [1/2, 2], to 1e-15: 2 artanh((x - 1)/(x + 1))."""
+    z = (x - 1.0) / (x + 1.0)
+    z2 = z * z
+    total: Scalar = 0.0
+    for k in range(29, 0, -2):
+        total = 1.0 / k + total * z2
+    return 2.0 * z * total
+
+
+def row(record: Any) -> list[Scalar]:
+    """The scalars of a record of scalars and tuples of them, in the order of its fields."""
+    values = (getattr(record, f.name) for f in fields(record))
+    return [x for value in values for x in (value if isinstance(value, tuple) else (value,))]
+
+
+def of_row(kind: type[T], scalars: Sequence[Scalar]) -> T:
+    """The record of that kind with the scalars of ``row``."""
+    rest, values = iter(scalars), {}
+    for f in fields(kind):  # type: ignore[arg-type]
+        size = SIZES[str(f.type)]
+        taken = tuple(next(rest) for _ in range(size))
+        values[f.name] = taken if size > 1 else taken[0]
+    return kind(**values)
+
+
+def size_of(kind: type) -> int:
+    """How many scalars a record of that kind has."""
+    return sum(SIZES[str(f.type)] for f in fields(kind))
+
+
+SIZES = {"Scalar": 1, "Pair": 2, "Place": 3}
+"""Scalars of a field, by its annotation."""
+
+
+def turned(p: Pair, angle: Scalar) -> Pair:
+    """A vector turned by an angle."""
+    c, s = cos(angle), sin(angle)
+    return c * p[0] - s * p[1], s * p[0] + c * p[1]
+
+
+def plus(a: Pair, b: Pair, factor: Scalar = 1.0) -> Pair:
+    """a + factor b."""
+    return a[0] + factor * b[0], a[1] + factor * b[1]
+
+
+def minus(a: Pair, b: Pair) -> Pair:
+    """a - b."""
+    return a[0] - b[0], a[1] - b[1]
+
+
+def within(p: Pair, low: Pair, high: Pair) -> Pair:
+    """p in a box, or the nearest point of it."""
+    return clipped(p[0], low[0], high[0]), clipped(p[1], low[1], high[1])
+
+
+def either(condition: Scalar, a: Sequence[Scalar], b: Sequence[Scalar]) -> tuple[Scalar, ...]:
+    """a where the condition holds, else b, scalar by scalar."""
+    return tuple(where(condition, x, y) for x, y in zip(a, b, strict=True))
+
+
+def pendulum(com: Pair, rate: Pair, zmp: Pair, w: Scalar, dt: Scalar) -> tuple[Pair, Pair]:
+    """Place and rate of the pendulum after dt on a fixed ZMP: exact."""
+    grown = exponential(w * dt)
+    c, s = 0.5 * (grown + 1.0 / grown), 0.5 * (grown - 1.0 / grown)
+    off = minus(com, zmp)
+    return (
+        plus(plus(zmp, off, c), rate, s / w),
+        (w * s * off[0] + c * rate[0], w * s * off[1] + c * rate[1]),
+    )
+
+
+def progress(u: Scalar, ramp: float = 0.25) -> Scalar:
+    """Share of a swing's way at share u of its time: cosine ramps at both ends, even speed between."""
+    speed, pi = 1.0 / (1.0 - ramp), math.pi
+
+    def rising(v: Scalar) -> Scalar:
+        return speed * (0.5 * v - ramp / (2 * pi) * sin(pi / ramp * v))
+
+    even = speed * (u - 0.5 * ramp)
+    return where(u < ramp, rising(u), where(u > 1.0 - ramp, 1.0 - rising(1.0 - u), even))
+
+
+def raised(u: Scalar, ramp: float = 0.35) -> Scalar:
+    """Share of a swing's lift at share u of its time: smooth up, level, and down."""
+    v = clipped(least(u, 1.0 - u) * (1.0 / ramp), 0.0, 1.0)
+    return v * v * (3.0 - 2.0 * v)
+
+
+@dataclass(frozen=True)
+class Gains:
+    """How strongly a stabiliser answers; its own figures, none of the robot's.
+
+    pull: share of the DCM's error that the pendulum takes over in a cycle, ahead and aside; rate_filter: of
+    the error's rate, share of the newest; lean: share of the trunk's lean by which the swing foot turns;
+    lean_filter: share of the newest; level_time: time constant of the slope's estimate [s]; sole: share of
+    the sole, less margin [m], in which the ZMP may go; step: share of what is left that the foot's place
+    takes, up to reach ahead and aside [m], by at most 12 mm a cycle; timing: share of it that the step's
+    time takes, within sooner to later of the planned time, by at most 20 ms a cycle; largest: error of the
+    DCM beyond which it counts no more [m].
+    """
+
+    pull: Pair = (0.12, 0.12)
+    rate_filter: Scalar = 0.4
+    lean: Scalar = 0.6
+    lean_filter: Scalar = 0.5
+    level_time: Scalar = 1.0
+    sole: Scalar = 0.6
+    margin: Scalar = 0.006
+    step: Scalar = 1.0
+    reach: Pair = (0.07, 0.05)
+    timing: Scalar = 1.0
+    sooner: Scalar = 0.7
+    later: Scalar = 1.4
+    largest: Scalar = 0.06
+
+
+@dataclass(frozen=True)
+class Rhythm:
+    """The walk that is to be stabilised: what is planned and constant.
+
+    period: of a step [s]; double: share of it on both feet; lift [m]; com_height: of the CoM [m]; apart: from
+    the middle to a foot [m]; half: half edges of the sole, and middle: of the sole ahead of the tip and
+    outwards [m]; beginning: from rest to the first step [s]; dt: of a cycle [s].
+    """
+
+    period: Scalar
+    double: Scalar
+    lift: Scalar
+    com_height: Scalar
+    apart: Scalar
+    half: Pair
+    middle: Pair
+    beginning: Scalar = 0.8
+    dt: Scalar = 0.01
+
+    @property
+    def w(self) -> Scalar:
+        """Rate of divergence [1/s]."""
+        return sqrt(GRAVITY / self.com_height)
+
+    @property
+    def both(self) -> Scalar:
+        """Time on both feet in a step [s]."""
+        return self.double * self.period
+
+
+@dataclass(frozen=True)
+class Landing:
+    """What a cycle of a step decides: ZMP and landing place in the stance foot's axes, and duration."""
+
+    zmp: Pair
+    place: Pair
+    period: Scalar
+    held: Pair
+
+
+def waited(z: Scalar) -> Scalar:
+    """1 - (1 - e^-z)/z of z from 0 to 3: share of a ZMP's distance by which a ramp lets the DCM grow more.
+
+    While the ZMP goes evenly to a point within time t, the DCM runs from that point as if it had stood
+    further away by this share of the ZMP's distance, at z = w t.
+    """
+    total: Scalar = 0.0
+    for k in range(24, 0, -1):
+        total = (1.0 - total) * z * (1.0 / (k + 1))
+    return total
+
+
+def entry(rhythm: Rhythm, side: Scalar, came: Pair, step: Sequence[Scalar]) -> Pair:
+    """DCM beside a foot's ZMP as it begins to stand, so that its step ends as the next ones need it.
+
+    Args:
+        rhythm: what is constant.
+        side: of that foot, +1 left.
+        came: by how much the ZMP moves to it, in its axes [m].
+        step: displacement (forward, left) of the other foot while it stands; later ones are taken for alike.
+    """
+    growth, late = exponential(rhythm.w * rhythm.period), waited(rhythm.w * rhythm.both)
+    alike, turns = (1.0 - growth * late) / (growth - 1.0), (1.0 + growth * late) / (growth + 1.0)
+    wide = 2.0 * (rhythm.apart + rhythm.middle[1])  # between the middles of the soles
+    goes = step[0], step[1] - side * wide
+    later = step[0] * alike, step[1] * alike + side * wide * turns
+    return (goes[0] + later[0]) / growth - late * came[0], (goes[1] + later[1]) / growth - late * came[1]
+
+
+def nominal_place(rhythm: Rhythm, side: Scalar, step: Sequence[Scalar]) -> Pair:
+    """Where a planned step (forward, left) lands, in the axes of the foot that stands, of side +1 left."""
+    return step[0], step[1] - side * (2.0 * rhythm.apart)
+
+
+class Course(Protocol):
+    """What the law asks of a walk in course; see ``stabiliser.Memory``."""
+
+    @property
+    def tau(self) -> Scalar:
+        """Time in the mode [s]."""
+
+    @property
+    def period(self) -> Scalar:
+        """Duration of the step [s]."""
+
+    @property
+    def side(self) -> Scalar:
+        """Of the foot that stands, +1 left."""
+
+    @property
+    def held(self) -> Pair:
+        """Wanted ZMP of the cycle before."""
+
+    @property
+    def place(self) -> Pair:
+        """Landing place of the cycle before."""
+
+
+def landing(
+    rhythm: Rhythm,
+    gains: Gains,
+    course: Course,
+    dcm: Pair,
+    zmp: Pair,
+    steps: Sequence[Sequence[Scalar]],
+    feedback: Scalar,
+) -> Landing:
+    """ZMP, landing place and time of a step in course.
+
+    Args:
+        rhythm: of the walk.
+        gains: of the stabiliser.
+        course: of the cycle before.
+        dcm: beside the stance foot's tip, in its axes.
+        zmp: of the cycle before, likewise.
+        steps: displacements (forward, left) of this step and of the next.
+        feedback: 0 leaves place and time as planned.
+    """
+    w, dt = rhythm.w, rhythm.dt
+    side, tau = course.side, course.tau
+    (cx, cy), (hx, hy) = rhythm.middle, rhythm.half
+    here, there = (cx, side * cy), (cx, -side * cy)
+    nominal = nominal_place(rhythm, side, steps[0])
+    came = minus(plus(nominal, there), here)
+    goal = plus(plus(nominal, there), entry(rhythm, -side, came, steps[1]))  # DCM as the step ends
+    left = larger(course.period - tau, dt)
+    growth = exponential(w * left)
+    ramp = growth * waited(w * clipped(rhythm.both - tau, 0.0, rhythm.both))
+    wanted = tuple(
+        (g - growth * x + ramp * z) / (1.0 - growth + ramp) for g, x, z in zip(goal, dcm, zmp, strict=True)
+    )
+    far = left > 0.1
+    held = where(far, wanted[0], course.held[0]), where(far, wanted[1], course.held[1])
+    room = gains.sole * (hx - gains.margin), gains.sole * (hy - gains.margin)
+    aim = within(held, minus(here, room), plus(here, room))
+    period = _timed(rhythm, gains, course, goal[1] - aim[1], dcm[1] - aim[1], feedback)
+    growth = exponential(w * larger(period - tau, dt))
+    end = plus(plus(aim, minus(dcm, aim), growth), minus(zmp, aim), -ramp)
+    free = plus(nominal, minus(end, goal), gains.step * feedback)  # what the ZMP leaves
+    (rx, ry), wide = gains.reach, 2.0 * rhythm.apart
+    close = larger(wide - ry, 2.0 * (hy - cy) + APART)
+    bounded = (
+        clipped(free[0], nominal[0] - rx, nominal[0] + rx),
+        -side * clipped(-side * free[1], close, wide + ry),
+    )
+    share = (tau - 0.5 * rhythm.both) / larger(period - rhythm.both, 1e-3)
+    moved = plus(course.place, within(minus(bounded, course.place), (-QUICK, -QUICK), (QUICK, QUICK)))
+    still = share >= LATE
+    chosen = where(still, course.place[0], moved[0]), where(still, course.place[1], moved[1])
+    return Landing(aim, chosen, period, held)
+
+
+def _timed(
+    rhythm: Rhythm, gains: Gains, course: Course, wanted: Scalar, now: Scalar, feedback: Scalar
+) -> Scalar:
+    """Duration of the step with which the DCM aside grows from where it is to where the next step wants it.
+
+    Both are beside the ZMP: where that suffices, the step takes its time. It changes by at most 20 ms
+    a cycle, once both feet have stood for their share, and not in the last moment.
+    """
+    w, T, tau = rhythm.w, rhythm.period, course.tau
+    most, free = exponential(0.02 * w), (tau > rhythm.both) & (course.period - tau > MOMENT)
+    growth = exponential(w * larger(course.period - tau, rhythm.dt))
+    runs = wanted * now > 1e-9
+    ratio = clipped(where(runs, wanted / where(runs, now * growth, 1.0), most), 1.0 / most, most)
+    change = feedback * gains.timing / w * logarithm(ratio)
+    timed = larger(clipped(course.period + change, gains.sooner * T, gains.later * T), tau + MOMENT)
+    return where(free, timed, course.period)
+
+
+def first_shift(rhythm: Rhythm, course: Course, dcm: Pair, beside: Pair) -> Pair:
+    """ZMP that brings the DCM from rest to where the first step wants it, within both soles.
+
+    Args:
+        rhythm: what is constant.
+        course: time since it began, and side of the foot that will stand.
+        dcm: in the axes of that foot.
+        beside: the other foot, in them.
+    """
+    side, (cx, cy) = course.side, rhythm.middle
+    goal = plus((cx, side * cy), entry(rhythm, side, (0.0, side * (rhythm.apart + cy)), (0.0, 0.0)))
+    settle = exponential(rhythm.w * larger(rhythm.beginning - course.tau, 0.08))
+    zmp = tuple((g - x * settle) / (1.0 - settle) for g, x in zip(goal, dcm, strict=True))
+    return _between(rhythm, (zmp[0], zmp[1]), beside)
+
+
+def stopping_zmp(rhythm: Rhythm, dcm: Pair, beside: Pair) -> Pair:
+    """ZMP that brings the DCM to rest between the feet, within both soles."""
+    middle = 0.5 * beside[0] + rhythm.middle[0], 0.5 * beside[1]
+    return _between(rhythm, plus(middle, minus(dcm, middle), 1.5), beside)
+
+
+def _between(rhythm: Rhythm, zmp: Pair, beside: Pair) -> Pair:
+    """The nearest ZMP of the box about both feet, three quarters of their soles."""
+    (hx, hy), mx = rhythm.half, rhythm.middle[0]
+    low = least(beside[0], 0.0) + mx - 0.75 * hx, least(beside[1], 0.0) - 0.75 * hy
+    high = larger(beside[0], 0.0) + mx + 0.75 * hx, larger(beside[1], 0.0) + 0.75 * hy
+    return within(zmp, low, high)

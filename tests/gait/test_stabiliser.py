@@ -1,0 +1,339 @@
+"""A stabilised walk: its law against closed forms, its kinematics against the library's, and symmetry."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import screwkin as sk
+from screwkin.algebra.se3 import Pose, Rotation, Vector, as_array, pose_from_array
+from screwkin.compiler.run import run
+from screwkin.errors import InputError
+from screwkin.gait.rhythm import CYCLE
+from screwkin.gait.stabilised import Course, Felt, StabilisedWalk, cycle_in_a_step, stabilised, stabiliser_of
+from screwkin.gait.stabiliser import STARTING, STEPPING, STOPPING, Memory
+from screwkin.gait.stabiliser_law import (
+    Gains,
+    Rhythm,
+    entry,
+    exponential,
+    landing,
+    logarithm,
+    of_row,
+    pendulum,
+    progress,
+    raised,
+    row,
+    size_of,
+    waited,
+)
+from screwkin.model.robot import Robot
+from screwkin.trajectory import Trajectory
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return sk.load_robot("bioloid")
+
+
+def planned(robot: Robot, steps: int = 4, **changes: object) -> Trajectory:
+    usual = {"Tc": 0.4, "stride": 0.08, "lift": 0.012, "lead": 0.6, "horizon": 1.0}
+    gait = sk.load_gait("preview").replace(**usual | changes)
+    return sk.walk(robot, gait, steps=steps)
+
+
+@pytest.fixture(scope="module")
+def plan(robot: Robot) -> Trajectory:
+    return planned(robot)
+
+
+@pytest.fixture(scope="module")
+def walk(robot: Robot, plan: Trajectory) -> StabilisedWalk:
+    return stabilised(robot, plan)
+
+
+def level(q: np.ndarray) -> Felt:
+    return Felt(np.eye(3), q, np.ones(2), np.zeros((2, 2)))
+
+
+def walked(walk: StabilisedWalk, cycles: int) -> list[Course]:
+    """Open loop."""
+    courses = [walk.start]
+    for _ in range(cycles):
+        courses.append(walk.advanced(courses[-1], level(courses[-1].q), feedback=False))
+    return courses
+
+
+@pytest.fixture(scope="module")
+def courses(walk: StabilisedWalk) -> list[Course]:
+    return walked(walk, len(walk.heights) + 40)
+
+
+def memory(course: Course) -> Memory:
+    return of_row(Memory, course.memory.tolist())
+
+
+# ---- The law
+
+
+@given(st.floats(-16.0, 16.0))
+def test_the_exponential_is_that_of_the_library(x: float) -> None:
+    assert exponential(x) == pytest.approx(math.exp(x), rel=1e-12)
+
+
+@given(st.floats(0.5, 2.0))
+def test_the_logarithm_is_that_of_the_library(x: float) -> None:
+    assert logarithm(x) == pytest.approx(math.log(x), rel=1e-12, abs=1e-15)
+
+
+@given(z=st.floats(0.01, 3.0), x=st.floats(-0.1, 0.1), far=st.floats(-0.1, 0.1))
+def test_a_zmp_on_its_way_lets_the_dcm_grow_by_its_waited_share(z: float, x: float, far: float) -> None:
+    """Against the integral of x' = w (x - p) with p on a ramp from far to 0 within t = z/w."""
+    w, steps = 8.0, 4000
+    dt, dcm = z / w / steps, x
+    for k in range(steps):  # each over an even share of the ramp: exact but for the ramp's slope within it
+        p = far * (1.0 - (k + 0.5) / steps)
+        dcm = p + (dcm - p) * math.exp(w * dt)
+    assert dcm == pytest.approx((x - waited(z) * far) * math.exp(z), abs=1e-6)
+
+
+@given(
+    w=st.floats(4.0, 12.0),
+    dt=st.floats(0.001, 0.05),
+    values=st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6),
+)
+def test_a_pendulum_falls_from_its_zmp_as_its_equation_says(w: float, dt: float, values: list[float]) -> None:
+    """The DCM grows by e^(w dt), its converging twin shrinks by it, and two halves make a whole."""
+    com, rate, zmp = tuple(values[:2]), tuple(values[2:4]), tuple(values[4:])
+    after, speed = pendulum(com, rate, zmp, w, dt)
+    for k in (0, 1):
+        for sign in (1.0, -1.0):
+            before = com[k] - zmp[k] + sign * rate[k] / w
+            assert after[k] - zmp[k] + sign * speed[k] / w == pytest.approx(
+                before * math.exp(sign * w * dt), abs=1e-9
+            )
+    half = pendulum(*pendulum(com, rate, zmp, w, dt / 2), zmp, w, dt / 2)
+    np.testing.assert_allclose([*half[0], *half[1]], [*after, *speed], atol=1e-9)
+
+
+def test_a_swing_goes_from_0_to_1_and_a_lift_from_0_to_0_without_a_jump() -> None:
+    u = np.linspace(0.0, 1.0, 2001)
+    way, height = np.array([progress(x) for x in u]), np.array([raised(x) for x in u])
+    assert way[[0, 1000, -1]] == pytest.approx([0.0, 0.5, 1.0])
+    assert height[[0, 1000, -1]] == pytest.approx([0.0, 1.0, 0.0])
+    assert np.diff(way).min() >= -1e-12
+    assert np.diff(way).max() * 2000 == pytest.approx(1.0 / 0.75, rel=1e-3)
+    assert np.abs(np.diff(way, 2)).max() < 1e-5
+    assert np.abs(np.diff(height, 2)).max() < 2e-5
+
+
+RHYTHM = Rhythm(0.4, 0.25, 0.012, 0.164, 0.042, (0.052, 0.033), (0.0, 0.0))
+
+
+@settings(max_examples=8)
+@given(
+    period=st.floats(0.3, 0.8), double=st.floats(0.1, 0.3), height=st.floats(0.12, 0.3),
+    ahead=st.floats(-0.05, 0.06), aside=st.floats(-0.01, 0.01), side=st.sampled_from([1.0, -1.0]),
+)  # fmt: skip
+def test_even_steps_are_a_fixed_point_of_the_law(
+    period: float, double: float, height: float, ahead: float, aside: float, side: float
+) -> None:
+    """A pendulum that steps evenly stays so, on ZMPs well within the soles: the plan agrees with itself."""
+    rhythm = replace(RHYTHM, period=period, double=double, com_height=height)
+    steps = [(ahead, aside)] * 2
+    zmp, origin = (-ahead, -side * 0.084), (0.0, 0.0)
+    dcm = entry(rhythm, side, (ahead, side * 0.084), (ahead, aside))
+    com, rate = (dcm[0], dcm[1]), (0.0, 0.0)
+    far = []
+    for _ in range(4):
+        tau, held, place = 0.0, (0.0, 0.0), (ahead, aside - side * 0.084)
+        while True:
+            xi = tuple(c + v / rhythm.w - o for c, v, o in zip(com, rate, origin, strict=True))
+            here = tuple(z - o for z, o in zip(zmp, origin, strict=True))
+            course = _Course(tau, period, side, held, place)
+            decided = landing(rhythm, Gains(), course, xi, here, steps, 0.0)  # type: ignore[arg-type]
+            held = decided.held
+            assert decided.period == period
+            np.testing.assert_allclose(decided.place, (ahead, aside - side * 0.084), atol=1e-12)
+            if tau >= period - 1e-9:
+                break
+            ease = CYCLE / max(rhythm.both - tau, CYCLE)
+            zmp = tuple(z + (o + p - z) * ease for z, o, p in zip(zmp, origin, decided.zmp, strict=True))
+            com, rate = pendulum(com, rate, zmp, rhythm.w, CYCLE)  # type: ignore[arg-type]
+            far.append(np.abs(decided.zmp))
+            tau += CYCLE
+        origin = (origin[0] + ahead, origin[1] + aside - side * 0.084)
+        side = -side
+    assert np.max(far[len(far) // 2 :], axis=0)[1] < 0.6 * 0.027
+    assert np.max(far[len(far) // 2 :], axis=0)[0] < 0.6 * 0.046 + 1e-12
+
+
+class _Course:
+    def __init__(self, tau: float, period: float, side: float, held: object, place: object) -> None:
+        self.tau, self.period, self.side, self.held, self.place = tau, period, side, held, place
+
+
+# ---- A walk
+
+
+def test_records_survive_their_rows() -> None:
+    gains = Gains(pull=(0.1, 0.2), reach=(0.3, 0.4))
+    assert of_row(Gains, row(gains)) == gains
+    assert len(row(gains)) == size_of(Gains)
+    assert of_row(Rhythm, row(RHYTHM)) == RHYTHM
+
+
+def test_the_plan_s_own_rhythm_and_steps_are_read_off_it(walk: StabilisedWalk) -> None:
+    rhythm = walk.rhythm
+    assert rhythm.period == pytest.approx(0.4)
+    assert rhythm.lift == pytest.approx(0.012, abs=5e-4)
+    assert rhythm.apart == pytest.approx(0.042165)
+    assert rhythm.half == pytest.approx((0.052, 0.033))
+    np.testing.assert_allclose(walk.steps[:-1], [[0.04, 0.0, 0.0]] * 3, atol=1e-9)
+    np.testing.assert_allclose(walk.steps[-1], 0.0, atol=1e-9)
+    assert 0.5 < walk.body.share < 1.0
+
+
+def test_open_loop_it_takes_the_planned_steps_and_comes_to_rest_between_the_feet(
+    walk: StabilisedWalk, plan: Trajectory, courses: list[Course]
+) -> None:
+    modes = [memory(course).mode for course in courses]
+    assert [m for m, n in itertools.pairwise(modes) if m != n] == [STARTING, STEPPING]
+    last = memory(courses[-1])
+    assert last.mode == STOPPING
+    assert courses[-1].landed == len(walk.steps)
+    feet = {last.side: last.stance, -last.side: last.other}
+    for side, tip in zip((-1.0, 1.0), walk.body.tips, strict=True):
+        np.testing.assert_allclose(feet[side][:2], plan.T_world_tip[tip][-1, :2, 3], atol=1e-6)
+    assert math.hypot(*last.rate) < 2e-3
+    assert last.com[0] == pytest.approx(plan.com[-1, 0], abs=2e-3)
+    assert abs(last.com[1]) < 2e-3
+
+
+def test_soles_are_where_the_memory_has_them_and_the_com_over_the_pendulum(
+    robot: Robot, walk: StabilisedWalk, courses: list[Course]
+) -> None:
+    """By the library's own forward kinematics: the stance foot flat on the floor, the CoM within 1 mm."""
+    T_waist_base = as_array(walk.body.T_waist_base)
+    for course in courses[5::23]:
+        now = memory(course)
+        k = min(round(course.time / CYCLE), len(walk.heights) - 1)
+        base = np.eye(4)
+        base[:3, 3] = [*now.waist, walk.heights[k]]
+        state = sk.State(base @ T_waist_base, course.q)
+        tip = walk.body.tips[int(now.side > 0)]
+        T = sk.frame_pose(robot, state, tip)
+        np.testing.assert_allclose(T[:3, 3], [now.stance[0], now.stance[1], 0.0], atol=1e-9)
+        np.testing.assert_allclose(T[:3, :3], np.eye(3), atol=1e-9)
+        np.testing.assert_allclose(sk.center_of_mass(robot, state)[:2], now.com, atol=1e-3)
+
+
+@settings(max_examples=10)
+@given(
+    heading=st.floats(-3.0, 3.0),
+    lean=st.tuples(st.floats(-0.1, 0.1), st.floats(-0.1, 0.1)),
+    seed=st.integers(0, 99),
+)
+def test_it_measures_the_com_whatever_the_imu_s_heading(
+    heading: float, lean: tuple[float, float], seed: int
+) -> None:
+    """A robot on one foot, anywhere, leaning with its sole: the gap is that of the library's CoM."""
+    robot = sk.load_robot("bioloid")
+    inputs = cycle_in_a_step(robot)
+    rng = np.random.default_rng(seed)
+    q = np.array(sk.home(robot).q) + rng.uniform(-0.1, 0.1, 18)
+    now = of_row(Memory, inputs["memory"].tolist())
+    cx, sx, cy, sy = math.cos(lean[0]), math.sin(lean[0]), math.cos(lean[1]), math.sin(lean[1])
+    R = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]]) @ np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+    base = np.eye(4)
+    base[:3, :3] = R
+    foot = sk.frame_pose(robot, sk.State(base, q), "left_foot")
+    com = sk.center_of_mass(robot, sk.State(base, q)) - foot[:3, 3]
+    yaw = math.atan2(foot[1, 0], foot[0, 0])
+    c, s = math.cos(-yaw), math.sin(-yaw)  # the stance foot heads ahead in the memory
+    expected = np.array([c * com[0] - s * com[1], s * com[0] + c * com[1]]) + now.stance[:2]
+    c, s = math.cos(heading), math.sin(heading)
+    inputs |= {
+        "attitude": np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ R,
+        "joints": q,
+        "force": np.array([0.0, 20.0]),
+        "pressure": np.zeros((2, 2)),
+    }
+    after = of_row(Memory, run(stabiliser_of(robot), inputs, ())["memory_after"].tolist())
+    np.testing.assert_allclose(np.array(after.gap) + now.com, expected, atol=1e-9)
+
+
+def test_without_feedback_nothing_felt_matters(walk: StabilisedWalk, courses: list[Course]) -> None:
+    rng = np.random.default_rng(1)
+    for course in courses[::40]:
+        strange = Felt(
+            np.linalg.qr(rng.normal(size=(3, 3)))[0], rng.normal(size=18), np.ones(2), np.ones((2, 2))
+        )
+        one, other = (walk.advanced(course, felt, False) for felt in (level(course.q), strange))
+        assert (one.q == other.q).all()
+        assert memory(one).com == memory(other).com
+
+
+def test_a_robot_that_does_what_it_is_told_is_left_alone(walk: StabilisedWalk, courses: list[Course]) -> None:
+    """Perfect tracking a cycle late: the stabilised walk stays within millimetres of the open one."""
+    course = walk.start
+    for other in courses[1 : len(walk.heights)]:
+        course = walk.advanced(course, level(course.q))
+        assert np.abs(course.q - other.q).max() < 0.05
+    assert course.landed == len(walk.steps)
+    np.testing.assert_allclose(memory(course).stance, memory(other).stance, atol=5e-3)
+
+
+def test_a_push_aside_lets_the_foot_land_where_the_robot_falls(
+    walk: StabilisedWalk, courses: list[Course]
+) -> None:
+    """A trunk that leans out over the stance foot in mid step: the CoM is felt there, so it lands nearer."""
+    k = next(k for k, course in enumerate(courses) if course.landed == 1 and memory(course).tau > 0.15)
+    places = []
+    for angle in (0.0, 0.15):
+        course = courses[k]
+        side = memory(course).side
+        c, s = math.cos(-side * angle), math.sin(-side * angle)
+        attitude = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+        for _ in range(8):
+            course = walk.advanced(course, replace(level(course.q), attitude=attitude))
+        places.append(-side * memory(course).place[1])
+    assert places[1] < places[0] - 5e-4
+
+
+def test_left_and_right_are_alike(robot: Robot, walk: StabilisedWalk, courses: list[Course]) -> None:
+    """The walk that begins with the other foot is the mirror image: CoM, ZMP and feet."""
+    other = stabilised(robot, planned(robot, 2, first="left"))
+    mirrored = walked(replace(other, rhythm=walk.rhythm, body=walk.body, steps=walk.steps), 130)
+    for one, other in zip(courses[:130:20], mirrored[::20], strict=False):
+        a, b = memory(one), memory(other)
+        np.testing.assert_allclose(a.stance, np.array(b.stance) * [1, -1, -1], atol=1e-9)
+        np.testing.assert_allclose(a.com, np.array(b.com) * [1, -1], atol=1e-9)
+        np.testing.assert_allclose(a.zmp, np.array(b.zmp) * [1, -1], atol=1e-9)
+
+
+def test_a_leg_out_of_reach_is_stretched(walk: StabilisedWalk) -> None:
+    far = Pose(Rotation(*(Vector(*row) for row in np.eye(3).tolist())), Vector(0.0, 0.0, 0.5))
+    feet = [pose_from_array(np.diag([1.0, 1.0, 1.0, 1.0])) for _ in range(2)]
+    q = np.array(walk.body.posture(far, feet, walk.start.q.tolist()), dtype=float)
+    assert np.isfinite(q).all()
+    knee = walk.body.robot.joint_names.index("right_knee")
+    assert abs(q[knee]) < 0.05
+
+
+@pytest.mark.parametrize(
+    ("gait", "words"), [("walk", "not geometric"), ("slope", "level ground"), ("soon", "lead = 1")]
+)
+def test_what_it_cannot_walk_is_refused(robot: Robot, gait: str, words: str) -> None:
+    if gait == "walk":
+        plan = sk.walk(robot, sk.load_gait("walk"), steps=1)
+    else:
+        plan = planned(robot, 2, **({"uphill": 0.03} if gait == "slope" else {"lead": 0.0, "Tc": 0.33}))
+    with pytest.raises(InputError, match=words):
+        stabilised(robot, plan)
