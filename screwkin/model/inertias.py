@@ -31,6 +31,24 @@ def inertia_from_matrix(matrix: Array) -> Inertia:
     return Inertia(*(float(matrix[pair]) for pair in pairs))
 
 
+def united(masses: Sequence[tuple[float, Array, Array]]) -> tuple[float, Array, Array]:
+    """One body of several masses, by Steiner's theorem about their common CoM.
+
+    Args:
+        masses: of each the mass, not all 0 [kg], the CoM (3,) [m] and the inertia about it (3, 3) [kg m^2].
+
+    Returns:
+        The same of the whole.
+    """
+    mass = sum(m for m, _, _ in masses)
+    com = np.sum([m * c for m, c, _ in masses], axis=0) / mass
+    total = np.zeros((3, 3))
+    for m, c, inertia in masses:
+        d = c - com
+        total += inertia + m * (d @ d * np.eye(3) - np.outer(d, d))
+    return mass, com, total
+
+
 def impossible(inertia: Inertia) -> str:
     """What is wrong with an inertia that no body has; nothing of one that a body can have.
 

@@ -26,6 +26,7 @@ from screwkin.model.inertias import (
     inertia_matrix,
     nearest_body,
     radius_of_gyration,
+    united,
     without_noise,
 )
 from screwkin.model.records import Box, CoupledJoint, Frame, Inertia, Joint, Link, RobotRecord, Shape
@@ -295,15 +296,11 @@ def _audited(reader: Reader, name: str, inertia: Inertia, mass: float, repair: b
 
 def _link(body: _Body) -> Link:
     """One body of all its masses: Steiner's theorem about the common CoM."""
-    mass = sum(m for m, _, _ in body.masses)
-    com = as_array(body.frame.p)
-    if mass:
-        com = np.sum([m * c for m, c, _ in body.masses], axis=0) / mass
-    total = np.zeros((3, 3))
-    for m, c, inertia in body.masses:
-        d = c - com
-        total += inertia + m * (d @ d * np.eye(3) - np.outer(d, d))
-    place = vector_from_array(com) if mass else body.frame.p
+    if any(m for m, _, _ in body.masses):
+        mass, com, total = united(body.masses)
+        place = vector_from_array(com)
+    else:
+        mass, place, total = 0.0, body.frame.p, sum((i for _, _, i in body.masses), np.zeros((3, 3)))
     return Link(
         body.name, mass, place, inertia_from_matrix(total), body.frame, tuple(body.boxes), tuple(body.shapes)
     )

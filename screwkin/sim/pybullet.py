@@ -31,7 +31,7 @@ from screwkin.sim.camera import Camera
 from screwkin.sim.couplings import couple_in_pybullet
 from screwkin.sim.drive import UNLIMITED, RigidServos, Servos, motored
 from screwkin.sim.floor import bounce_in_pybullet, floor_in_pybullet
-from screwkin.sim.loops import close_in_pybullet, quat_xyzw
+from screwkin.sim.loops import close_in_pybullet, quat_xyzw, with_shared_masses
 from screwkin.sim.perturbation import NONE, Perturbation, noted
 from screwkin.sim.pybullet_feet import Feet
 from screwkin.sim.pybullet_look import Look, pose_of
@@ -114,7 +114,7 @@ class PyBulletBackend:
         self._motored = motored(robot)
         rotors = self._servos.rotor_inertia * self._motored
         steadied = not self._servos.relative_rotors
-        opened = replace(solid(robot), closures=())
+        opened = replace(solid(with_shared_masses(robot)), closures=())
         urdf = urdf_of_bodies(with_rotors(opened, rotors, steadied))
         self._p = _imported_pybullet()
         self._client = _connected(self._p, gui)
