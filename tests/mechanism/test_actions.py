@@ -16,31 +16,14 @@ from screwkin.mechanism.actions import action_system, assembled_actions, unit_ac
 from screwkin.mechanism.network import coupling_screws
 from screwkin.model.table import load_robot
 from tests.kinematics.machines import random_loops, random_mechanism, seeds
+from tests.mechanism.duality import duality, every_effort
 
 LINKAGES = ("four-bar", "slider-crank", "bennett", "rssr", "stewart")
 loops = st.integers(1, 4)
 
 
-def every_effort(mechanism):
-    """All joints active, nothing on the floor but what is bolted there."""
-    return action_system(mechanism, mechanism.robot.joint_names, ())
-
-
-def null(matrix):
-    """An orthonormal basis of the null space, as rows."""
-    _, sigma, V = np.linalg.svd(matrix)
-    return V[int((sigma > 1e-9 * sigma[0]).sum()) :]
-
-
 def assert_dual(robot):
-    """Every self-stress and effort in equilibrium does no work on any motion that the loops allow."""
-    mechanism = sk.closed_mechanism(robot)
-    system, home = every_effort(mechanism), sk.home(robot)
-    A = sk.action_matrix(mechanism, home, robot.joint_names, ())
-    motions, actions = null(sk.network_matrix(mechanism, home)), null(A)
-    efforts = actions[:, [system.names.index(name) for name in robot.joint_names]]
-    rates = motions[:, [mechanism.position[name] for name in robot.joint_names]]
-    assert np.abs(efforts @ rates.T).max(initial=0) < 1e-12
+    assert duality(robot) < 1e-12
 
 
 def assert_counted(robot):

@@ -1,15 +1,116 @@
-"""A robot with loops as Pinocchio's model, joint by joint, with its closures as rigid constraints."""
+"""A robot with loops as Pinocchio's model, and how far its dynamics are from ours there."""
 
 from __future__ import annotations
 
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
+import screwkin as sk
 from screwkin.algebra.se3 import Pose, as_array
+from screwkin.dynamics.loops import driving_joints, loops_of
 from screwkin.model.robot import Inertia, Joint, Link, Robot
+from tests.kinematics.machines import array_of, pose
 
 pin: Any = __import__("pinocchio")
+
+
+BOUNDS = {"back": 1e-9, "closed": 1e-9, "bent": 1e-6, "newton": 1e-9, "pinocchio": 1e-9}
+"""Of the deviations below; what bends is a finite difference."""
+
+
+def assert_within(found: dict[str, float]) -> None:
+    """That no deviation exceeds its bound."""
+    beyond = {name: value for name, value in found.items() if not value <= BOUNDS[name]}
+    assert not beyond, beyond
+
+
+def deviations(robot: Robot, seed: int) -> dict[str, float]:
+    """How far a random motion of a robot with loops is from Pinocchio's, each relative to its largest value.
+
+    Args:
+        robot: closed at home, away from singular postures.
+        seed: of the motion.
+
+    Returns:
+        ``back``: accelerations that forward dynamics makes of the efforts of inverse dynamics;
+        ``closed``: rates at which the loops' ends part; ``bent``: their accelerations, against differences;
+        ``newton``: the efforts along all that the loops leave free, against recursive Newton-Euler;
+        ``pinocchio``: accelerations by its constraint dynamics.
+    """
+    rng = np.random.default_rng(seed)
+    n, R = len(robot.joints), array_of(pose(rng))[:3, :3]
+    T = np.eye(4)
+    T[:3, :3] = R
+    state = sk.State(T, sk.home(robot).q)
+    qd, qdd = np.zeros((2, n))
+    driving = [robot.joint_names.index(name) for name in driving_joints(robot)]
+    qd[driving], qdd[driving] = rng.uniform(-1, 1, (2, len(driving)))
+    twist, rate = rng.uniform(-1, 1, (2, 6)) * (robot.base == "floating")
+    force = sk.inverse_dynamics(robot, state, qd, qdd, twist, rate)
+    found = sk.forward_dynamics(robot, state, qd, force[6:], twist, force[:6])
+
+    model, constraints, places = constrained(robot)
+    data = model.createData()
+    q = pin.neutral(model)
+    q[3:7] = Rotation.from_matrix(R).as_quat()
+    for name, value in zip(robot.joint_names, state.q, strict=True):
+        q[model.joints[model.getJointId(name)].idx_q] = value
+    v, a, tau = np.zeros((3, model.nv))
+    v[:3], v[3:6] = R.T @ twist[3:], R.T @ twist[:3]
+    v[places] = all_rates(robot, state, qd)
+    a[:3], a[3:6] = R.T @ (rate[3:] - np.cross(twist[:3], twist[3:])), R.T @ rate[:3]
+    a[places] = found[6:]
+    tau[:3], tau[3:6] = R.T @ force[3:6], R.T @ force[:3]
+    tau[places] = force[6:]
+
+    def parting(x: Any) -> Any:
+        """Jacobian of what the two sides of every closure move differently, at the world origin."""
+        pin.computeJointJacobians(model, data, x)
+        sides = [(one.joint1_id, one.joint2_id) for one in constraints]
+        jacobian = lambda side: pin.getJointJacobian(model, data, side, pin.ReferenceFrame.WORLD)  # noqa: E731
+        return np.vstack([jacobian(a) - jacobian(b) for a, b in sides])
+
+    J, h = parting(q), 1e-5
+    moved = [parting(pin.integrate(model, q, k * h * v)) for k in (-1, 1)]
+    _, S, V = np.linalg.svd(J)
+    free = V[(1e-9 * S[0] < S).sum() :]
+    needed = pin.rnea(model, data, q, v, a)
+    one = np.r_[rate, qdd[driving]]
+    return {
+        "back": _apart(np.r_[found[:6], found[6:][driving]], one, found),
+        "closed": _apart(J @ v, 0.0, v),
+        "bent": _apart(J @ a, -(moved[1] - moved[0]) / (2 * h) @ v, a),
+        "newton": _apart(free @ needed, free @ tau, needed),
+        "pinocchio": _apart(_accelerations(model, data, q, v, tau, constraints), a, a),
+    }
+
+
+def _accelerations(model: Any, data: Any, q: Any, v: Any, tau: Any, constraints: Any) -> Any:
+    """By Pinocchio's constraint dynamics."""
+    kept = pin.StdVec_RigidConstraintData()
+    kept.extend(c.createData() for c in constraints)
+    pin.initConstraintDynamics(model, data, constraints, kept)
+    proximal = pin.ProximalSettings(1e-14, 1e-12, 100)
+    return pin.constraintDynamics(model, data, q, v, tau, constraints, kept, proximal)
+
+
+def _apart(found: Any, wanted: Any, size: Any) -> float:
+    """Largest difference, over 1 and the largest of what stands for its size."""
+    return float(np.abs(found - wanted).max(initial=0.0) / (1.0 + np.abs(size).max()))
+
+
+def all_rates(robot: Robot, state: Any, qd: Any) -> Any:
+    """Rates of all joints from those that drive, by singular values of N."""
+    mechanism = loops_of(robot)
+    N = sk.network_matrix(mechanism, state)
+    driving = [mechanism.position[name] for name in mechanism.primary]
+    following = mechanism.secondary_columns
+    rates = np.zeros(len(mechanism.couplings))
+    rates[driving] = [qd[robot.joint_names.index(name)] for name in mechanism.primary]
+    rates[following] = np.linalg.lstsq(N[:, following], -N[:, driving] @ rates[driving], rcond=None)[0]
+    return rates[[mechanism.position[name] for name in robot.joint_names]]
 
 
 def depth_first(robot: Robot) -> list[Joint]:

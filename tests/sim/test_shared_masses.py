@@ -56,7 +56,7 @@ def squat(robot, knee):
 
 
 def test_a_knee_near_its_dead_point_follows_its_motor_in_pybullet() -> None:
-    """Six degrees from where the parallelogram lies flat; with an eye of no mass the knees sink by 9 degrees."""
+    """Six degrees from where the parallelogram lies flat; on an eye of no mass the knees sink by 9 degrees."""
     robot = flat_at_90()
     state, knee = squat(robot, np.deg2rad(84.0)), robot.joint_names.index("right_knee")
     backend = PyBulletBackend(robot)
