@@ -18,7 +18,7 @@ NEAR = np.deg2rad(10.0)
 LEAST = np.deg2rad(2.0)
 """Way to a dead point below which a walk is refused: play in the joints may take a linkage across."""
 BETWEEN = 16
-"""Way to a dead point below which a walk is refused: play may take a linkage across [rad or m]."""
+"""Postures that are looked at between two samples where the next dead point is less than a step away."""
 
 
 def dead_points(robot: Robot, time: Array, q: Array) -> tuple[str, ...]:

@@ -16,8 +16,8 @@ from tests.kinematics.machines import array_of, pose, random_loops
 from tests.linked import flat_at_90, gaps
 
 
-@given(seed=st.integers(0, 2), loops=st.integers(1, 4))
-@settings(max_examples=4, derandomize=True)
+@given(seed=st.integers(0, 2), loops=st.integers(1, 2))
+@settings(max_examples=3, derandomize=True)
 def test_a_closed_mechanism_is_the_same_however_the_mass_of_its_welds_is_divided(seed, loops):
     robot = random_loops(seed, loops, "floating", False)
     home = sk.home(robot)
@@ -56,7 +56,7 @@ def squat(robot, knee):
 
 
 def test_a_knee_near_its_dead_point_follows_its_motor_in_pybullet() -> None:
-    """Six degrees from where the parallelogram lies flat; on an eye of no mass the knees sink by 9 degrees."""
+    """Six degrees from where the parallelogram lies flat; on an eye without mass the knees sink 9 degrees."""
     robot = flat_at_90()
     state, knee = squat(robot, np.deg2rad(84.0)), robot.joint_names.index("right_knee")
     backend = PyBulletBackend(robot)
