@@ -10,12 +10,14 @@ import numpy as np
 
 from screwkin.algebra.se3 import IDENTITY, ZERO, Vector, as_array
 from screwkin.errors import UnreachableError, one_of
-from screwkin.mechanism.choice import CLOSED, closed_mechanism, mobility_at
+from screwkin.mechanism.choice import CLOSED, closed_mechanism, mechanism_imposing, mobility_at
 from screwkin.mechanism.closure import close_loops
 from screwkin.mechanism.linkages import motor_joints
 from screwkin.mechanism.mechanism import Mechanism
 from screwkin.mechanism.network import coupling_twists, network_of_twists
+from screwkin.mechanism.quantities import secondary_rates
 from screwkin.mechanism.singularity import LimbSingularity, singularity_report
+from screwkin.mechanism.virtual_chain import VirtualChain
 from screwkin.model.coupled import coupling_of
 from screwkin.model.robot import Robot
 from screwkin.model.state import State, reference_base, reference_posture
@@ -37,6 +39,10 @@ class Facts:
     state: State
     """Where the singular values are taken, the base at the world's origin."""
     limbs: tuple[LimbSingularity, ...]
+    coordinates: Mapping[str, float]
+    """Of all couplings, where chains are added [rad or m]."""
+    rates: Mapping[str, float]
+    """Of all couplings, where some are imposed [rad/s or m/s]."""
 
     @property
     def network_shape(self) -> tuple[int, int]:
@@ -72,6 +78,8 @@ class Facts:
             "singularity": [
                 {key: value for key, value in asdict(limb).items() if key != "sample"} for limb in self.limbs
             ],
+            **({"coordinates": dict(self.coordinates)} if self.coordinates else {}),
+            **({"rates": dict(self.rates)} if self.rates else {}),
         }
 
 
@@ -82,6 +90,8 @@ def facts_of(
     point: Sequence[float] | None = None,
     primary: Sequence[str] | None = None,
     imposed: Mapping[str, float] | None = None,
+    chains: Sequence[VirtualChain] = (),
+    rates: Mapping[str, float] | None = None,
 ) -> Facts:
     """The facts of a robot in a posture.
 
@@ -91,15 +101,18 @@ def facts_of(
         place: where its base stands in the world [m].
         point: world point [m] at which N is formed; default: the base origin, which travels with the robot.
         primary: names of the couplings to impose; default: those of ``closed_mechanism``.
-        imposed: coordinates [rad or m] to which couplings that are primary by default go from the posture.
+        imposed: coordinates [rad or m] to which couplings go from the posture, the other primary ones at
+            rest; of a real joint one that is primary by default.
+        chains: further virtual chains.
+        rates: of couplings [rad/s or m/s], the other primary ones at rest.
 
     Raises:
         UnknownNameError: no such posture or coupling. UnreachableError: the loops do not close there.
     """
-    mechanism = closed_mechanism(robot, primary)
+    mechanism = closed_mechanism(robot, primary, chains)
     q = list(reference_posture(robot) if posture is None else robot.posture(posture).q)
     if imposed:
-        q = _moved(robot, q, imposed)
+        q = _moved(robot, q, imposed, chains)
     about = ZERO if point is None else Vector(*point) - Vector(*place)
     at_waist, N = (
         network_of_twists(mechanism, coupling_twists(mechanism, IDENTITY, q, p)) for p in (ZERO, about)
@@ -114,12 +127,39 @@ def facts_of(
         condition=_condition(N[:, mechanism.secondary_columns]),
         state=state,
         limbs=singularity_report(mechanism, state) if mechanism.secondary else (),
+        coordinates=_coordinates(mechanism, state),
+        rates=_rates(robot, state, rates, chains) if rates else {},
     )
 
 
-def _moved(robot: Robot, q: Sequence[float], imposed: Mapping[str, float]) -> list[float]:
+def _coordinates(mechanism: Mechanism, state: State) -> dict[str, float]:
+    """Of all couplings in a posture [rad or m]; none where no chain is added."""
+    if not mechanism.added:
+        return {}
+    x = close_loops(mechanism, state, {}).coordinates
+    return dict(zip(mechanism.couplings, map(float, x), strict=True))
+
+
+def _rates(
+    robot: Robot, state: State, imposed: Mapping[str, float], chains: Sequence[VirtualChain]
+) -> dict[str, float]:
+    """Rates of all couplings where some are imposed [rad/s or m/s]."""
+    mechanism = mechanism_imposing(robot, tuple(imposed), chains)
+    primary = np.array([imposed.get(name, 0.0) for name in mechanism.primary])
+    following = secondary_rates(mechanism, state, primary)
+    names = (*mechanism.primary, *mechanism.secondary)
+    values = dict(zip(names, (*primary, *following), strict=True))
+    return {name: float(values[name]) for name in mechanism.couplings}
+
+
+def _moved(
+    robot: Robot, q: Sequence[float], imposed: Mapping[str, float], chains: Sequence[VirtualChain]
+) -> list[float]:
     """The posture to which couplings have gone from another one, in steps along which loops close."""
-    mechanism = closed_mechanism(robot)
+    mechanism = closed_mechanism(robot, chains=chains)
+    added = {name for chain in mechanism.added for name in chain.names}
+    if added & {*imposed}:
+        mechanism = mechanism_imposing(robot, tuple(imposed), chains)
     base = reference_base(robot) if any(c.on_floor for c in robot.closures) else IDENTITY
     state = State(as_array(base).astype(float), np.array(q, dtype=float))
     start = dict(zip(mechanism.couplings, close_loops(mechanism, state, {}).coordinates, strict=True))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -14,6 +15,7 @@ from screwkin.cli.options import AsJson, RobotName, assignments, point_of
 from screwkin.cli.output import aligned, drawn, print_json, remark
 from screwkin.compiler.run import large_batches
 from screwkin.errors import MissingDependencyError
+from screwkin.mechanism.chain_files import load_chains
 from screwkin.mechanism.singularity import LimbSingularity
 from screwkin.model.coupled import coupling_text
 from screwkin.model.robot import Robot
@@ -22,6 +24,9 @@ from screwkin.report.graph import mechanism_graph
 from screwkin.report.singular import save_singularities
 from screwkin.report.style import save_figure, styled
 from screwkin.sim.self_collision import touching_at_home
+
+STILL = 1e-12
+"""What is written as 0, being rounding [rad or m, and their rates]."""
 
 
 def info(
@@ -48,6 +53,16 @@ def info(
     graph: Annotated[
         bool, typer.Option("--graph", help="Draw the graph of links, couplings and circuits.")
     ] = False,
+    chains: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="A TOML file of [[chain]] rows: virtual chains."),
+    ] = None,
+    rate: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="COUPLING=VALUE", help="Impose a rate, others rest [rad/s or m/s]; may be repeated."
+        ),
+    ] = None,
     output: Annotated[
         Path | None,
         typer.Option("-o", "--output", metavar="DIR", help="Folder for pictures of what is singular."),
@@ -62,6 +77,8 @@ def info(
         point_of(point, "--point"),
         primary,
         assignments("--move", move or [], "crank=0.5"),
+        () if chains is None else load_chains(chains),
+        assignments("--rate", rate or [], "crank=0.5"),
     )
     if graph or output is not None:
         with output_folder(output, "info", facts.robot.name) as folder:
@@ -130,6 +147,7 @@ def _text(facts: Facts) -> str:
             ],
         ),
     ]
+    closed += _moving(facts)
     limbs = [row for limb in facts.limbs for row in _singular(limb)]
     parts = [
         f"{robot.name}: {robot.description}",
@@ -143,6 +161,18 @@ def _text(facts: Facts) -> str:
     if limbs:
         parts += ["smallest singular value, dimensionless by the robot's size", aligned(limbs, "  ")]
     return "\n".join(parts)
+
+
+def _moving(facts: Facts) -> Iterator[tuple[str, str]]:
+    """Coordinates of chains that are added, and rates where some are imposed; zeros are left out."""
+    for chain in facts.mechanism.added:
+        yield f"chain {chain.name}", _values({name: facts.coordinates[name] for name in chain.names})
+    if facts.rates:
+        yield "rates", _values({name: x for name, x in facts.rates.items() if abs(x) > STILL})
+
+
+def _values(named: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} {x if abs(x) > STILL else 0:.6g}" for name, x in named.items())
 
 
 def _singular(limb: LimbSingularity) -> list[tuple[str, ...]]:

@@ -118,6 +118,37 @@ def closed_mechanism(
     return Mechanism(robot, *_checked(robot, named, added))
 
 
+def mechanism_imposing(robot: Robot, names: Sequence[str], chains: Sequence[VirtualChain] = ()) -> Mechanism:
+    """The closed mechanism of the default choice, but that couplings of these names are primary.
+
+    For every one of them that measures or follows by default another coupling follows instead, the one that
+    would rather than any other.
+
+    Args:
+        robot: as for ``closed_mechanism``.
+        names: of couplings to impose.
+        chains: further virtual chains.
+
+    Raises:
+        UnknownNameError: no such coupling. SingularError: they depend on one another. Else as
+            ``closed_mechanism``.
+    """
+    mechanism = closed_mechanism(robot, chains=chains)
+    wanted = [mechanism.position[one_of("coupling", name, mechanism.couplings)] for name in names]
+    if {*names} <= {*mechanism.primary}:
+        return mechanism
+    q, T = reference_posture(robot), reference_base(robot)
+    N = referenced(mechanism, network_of_twists(mechanism, coupling_twists(mechanism, T, q)))
+    order = [column for column in preference(mechanism) if column not in wanted]
+    following = independent(N, [*order, *wanted])
+    if tied := [mechanism.couplings[column] for column in wanted if column in following]:
+        raise SingularError(
+            f"{', '.join(names)} cannot all be imposed: {', '.join(tied)} follows from others; leave it out"
+        )
+    primary = [name for column, name in enumerate(mechanism.couplings) if column not in following]
+    return closed_mechanism(robot, primary, chains)
+
+
 Parts = tuple[
     tuple[VirtualChain, ...],
     CouplingGraph,

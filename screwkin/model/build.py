@@ -94,20 +94,20 @@ def robot_from_rows(rows: Rows) -> RobotRecord:
         joints=joints,
         coupled=coupled_of(rows),
         limbs=tuple(
-            Limb(row.name, row.kind, row.link, row.tip, _pose(row.frame), row.chain)
+            Limb(row.name, row.kind, row.link, row.tip, row_pose(row.frame), row.chain)
             for _, row in rows.good("limb")
         ),
         soles=tuple(Sole(row.limb, tuple(row.corners)) for _, row in rows.good("sole")),
         closures=tuple(
-            Closure(row.name, row.link_a, _pose(row.frame_a), row.link_b, _pose(row.frame_b))
+            Closure(row.name, row.link_a, row_pose(row.frame_a), row.link_b, row_pose(row.frame_b))
             for _, row in rows.good("closure")
         ),
         postures=tuple(
             Posture(row.name, row.base_height or 0.0, tuple(row.q.get(joint.name, 0.0) for joint in joints))
             for _, row in rows.good("posture")
         ),
-        frames=tuple(Frame(row.name, row.link, _pose(row.pose)) for _, row in rows.good("frame")),
-        waist=None if rows.waist is None else _pose(rows.waist.row),
+        frames=tuple(Frame(row.name, row.link, row_pose(row.pose)) for _, row in rows.good("frame")),
+        waist=None if rows.waist is None else row_pose(rows.waist.row),
         servos=rows.servos,
     )
 
@@ -147,7 +147,7 @@ def _joint(row: JointRow) -> Joint:
 
 def _link(row: LinkRow, origin: Vector) -> Link:
     """A link; its own frame lies at its joint unless it has one, its CoM there if it is massless."""
-    frame = Pose(UNTURNED, origin) if row.frame is None else _pose(row.frame)
+    frame = Pose(UNTURNED, origin) if row.frame is None else row_pose(row.frame)
     com = frame.p if row.com is None else row.com
     boxes = tuple(Box(box.center, box.size) for box in row.boxes)
     shapes = tuple(_shape(shape) for shape in row.shapes)
@@ -167,7 +167,7 @@ def _spring(row: SpringRow) -> LinkSpring:
 
 def _shape(row: ShapeRow) -> Shape:
     """A shape of the kind that the row has a value for; a sphere's is its radius alone."""
-    pose = IDENTITY if row.frame is None else _pose(row.frame)
+    pose = IDENTITY if row.frame is None else row_pose(row.frame)
     kind: ShapeKind = next(kind for kind in get_args(ShapeKind) if getattr(row, kind) is not None)
     value = row.scale if kind == "mesh" else getattr(row, kind)
     size = (value,) if kind == "sphere" else tuple(value)
@@ -184,7 +184,7 @@ def _inertia(row: InertiaRow | None, mass: Scalar) -> Inertia:
     return Inertia(times(mass, (y + z) / 12), times(mass, (x + z) / 12), times(mass, (x + y) / 12))
 
 
-def _pose(row: FrameRow) -> Pose:
+def row_pose(row: FrameRow) -> Pose:
     """Rotation Rz(yaw) Ry(pitch) Rx(roll): turns about the fixed base axes, roll first."""
     roll, pitch, yaw = row.rpy
     return Pose(rotate(Z, yaw) @ rotate(Y, pitch) @ rotate(X, roll), row.xyz)

@@ -221,6 +221,8 @@ _PARTS: Mapping[str, type[Row]] = {
     "frame_a": FrameRow,
     "frame_b": FrameRow,
     "pose": FrameRow,
+    "end_frame": FrameRow,
+    "start_frame": FrameRow,
     "boxes": BoxRow,
     "shapes": ShapeRow,
     "mimic": MimicRow,

@@ -136,3 +136,26 @@ def test_a_move_or_a_choice_that_cannot_be_is_refused(cli, words, code, message)
 def test_the_graph_is_drawn_where_it_is_asked_for(cli, tmp_path):
     assert cli("info", "linkages/four-bar", "--graph", "-o", "out").code == 0
     assert (tmp_path / "out" / "graph.png").stat().st_size > 10_000
+
+
+CHAIN = """
+[[chain]]
+name = "line"
+couplings = "3P3R"
+end = "right_hand"
+start_frame = { xyz = [0, -0.065, 0], rpy = [0, "-30*deg", 0] }
+"""
+
+
+def test_a_chain_of_a_file_is_led(cli, tmp_path):
+    """Along a line that rises by 30 degrees: 0.866 ahead and 0.5 up."""
+    (tmp_path / "line.toml").write_text(CHAIN, encoding="utf-8")
+    words = ("info", "bioloid", "--chains", "line.toml", "--move", "line.px=0.02", "--move", "line.pz=0")
+    three = ("--rate", "line.px=0.1", "--rate", "line.py=0", "--rate", "line.pz=0")
+    told = cli(*words, *three, "--json").data
+    assert told["couplings"] == 54
+    assert told["coordinates"]["line.px"] == pytest.approx(0.02, abs=1e-9)
+    assert told["coordinates"]["line.pz"] == pytest.approx(0, abs=1e-9)
+    hand = [told["rates"][f"right_hand.{c}"] for c in ("px", "py", "pz")]
+    assert hand == pytest.approx([0.0866025404, 0, 0.05], abs=1e-9)
+    assert "line.px 0.02" in cli(*words).out
