@@ -38,8 +38,10 @@ def checked_springs(robot: Robot, springs: Mapping[str, Spring] | None) -> dict[
 def spring_effort(law: Any, deflection: Array) -> tuple[Array, Array]:
     """Effort and slope (...) of a law at deflections (...); beyond a table's ends its last lines go on."""
     if callable(law):
-        effort, slope = (np.broadcast_to(np.asarray(x, float), deflection.shape) for x in law(deflection))
-        return effort, slope
+        effort, slope = (np.asarray(x, float) for x in law(deflection))
+        if effort.shape == slope.shape == deflection.shape:
+            return effort, slope
+        return np.broadcast_to(effort, deflection.shape), np.broadcast_to(slope, deflection.shape)
     slopes = np.diff(law[:, 1]) / np.diff(law[:, 0])
     piece = np.clip(np.searchsorted(law[:, 0], deflection, side="right") - 1, 0, len(slopes) - 1)
     return law[piece, 1] + slopes[piece] * (deflection - law[piece, 0]), slopes[piece]

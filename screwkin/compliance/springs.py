@@ -53,9 +53,9 @@ def spring_stiffness(robot: Robot, stiffness: SpringChoice = None, curved: Itera
     """
     motors, curved = motor_joints(robot), set(curved)
     passive = {name for name in robot.joint_names if name not in motors}
-    if _of_motors(robot, stiffness):
-        return np.where([name in passive | curved for name in robot.joint_names], 0, joint_stiffness(robot))
     needed = any(name not in passive | curved for name in robot.joint_names)
+    if needed and _of_motors(robot, stiffness):
+        return np.where([name in passive | curved for name in robot.joint_names], 0, joint_stiffness(robot))
     chosen = _chosen(robot, stiffness) if needed or stiffness is not None else {}
     given = chosen if isinstance(chosen, Mapping) else {"default": chosen}
     k = _by_joint(
