@@ -25,6 +25,14 @@ def flat_at_90() -> Robot:
     return parse_robot(FLAT_AT_90)
 
 
+@cache
+def short_bars() -> Robot:
+    """The same on bars of 20 mm, and with forearms in line with the upper arms."""
+    return parse_robot(
+        FLAT_AT_90.replace("bar = 0.03", "bar = 0.02").replace("arm_out = 0.02", "arm_out = 0")
+    )
+
+
 def four_bar_knee(top: tuple[float, float], end: tuple[float, float]) -> Robot:
     """A Bioloid whose reference posture is straight, with pins at x, z from hip pitch and knee axis [m]."""
     text = re.sub(

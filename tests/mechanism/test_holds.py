@@ -16,6 +16,7 @@ from screwkin.dynamics.contact_forces import ContactForces
 from screwkin.errors import InputError, TableError, UnreachableError
 from screwkin.gait.held import with_held_joints
 from screwkin.kinematics.status import Status
+from screwkin.mechanism.action_choice import action_choice
 from screwkin.mechanism.holds import on_floor
 from screwkin.mechanism.linkages import linkages, motor_joints
 from screwkin.model.records import FLOOR, Closure
@@ -131,6 +132,9 @@ def test_the_floor_carries_the_weight_and_six_internal_freedoms_are_named() -> N
     home, mechanism = sk.home(robot), sk.closed_mechanism(robot)
     forces = sk.static_forces(mechanism, home, weights=True)
     assert forces.system.contacts == ("right_sole", "left_sole")
+    choice = action_choice(mechanism, None, forces.system.active, forces.system.contacts)
+    assert choice.degree == 6
+    assert choice.primary == tuple(f"left_sole.{c}" for c in ("mx", "my", "mz", "fx", "fy", "fz"))
     lifted = sum(forces.wrench(name)[5] for name in forces.system.contacts)
     assert lifted == pytest.approx(16.677, abs=1e-9)
     free = sk.load_robot("bioloid")

@@ -13,13 +13,16 @@ from screwkin.sim.backend import Command
 from screwkin.sim.drive import motored
 from screwkin.sim.mujoco import MuJoCoBackend
 from screwkin.sim.pybullet import PyBulletBackend
-from tests.linked import BUNDLED, flat_at_90, gaps
+from tests.linked import BUNDLED, flat_at_90, gaps, short_bars
 
 GAITS = {
     "flat": {"lift": 0.012},
+    "short": {"lift": 0.012, "hand_drop": 0.09},
     "linkages/tarsus-legs": {"lift": 0.015, "stride": 0.1, "waist_height": 0.165},
 }
 """What the default gait is changed to: shorter legs, or knees that may not come to a right angle."""
+FLAT = {"flat": flat_at_90, "short": short_bars}
+"""Knees that lie flat at 90 degrees, with bars of 30 mm and of 20 mm."""
 ENGINES = {"mujoco": MuJoCoBackend, "pybullet": PyBulletBackend}
 
 
@@ -47,9 +50,9 @@ def test_urdf_refuses_loops_by_name() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", [*BUNDLED, "flat"])
+@pytest.mark.parametrize("name", [*BUNDLED, *FLAT])
 def test_six_steps_pass_in_both_engines(name: str) -> None:
-    robot = flat_at_90() if name == "flat" else sk.load_robot(name)
+    robot = FLAT[name]() if name in FLAT else sk.load_robot(name)
     gait = sk.load_gait("walk").replace(**GAITS.get(name, {}))
     walk = sk.walk(robot, gait, 6)
     verdict = sk.validate(robot, walk)
