@@ -10,11 +10,12 @@ from typing import Annotated
 import typer
 
 from screwkin.analysis.account import account_of, recorded_robot
+from screwkin.analysis.clear_hands import clearing_hand_drop
 from screwkin.analysis.engines import AUTO, SimulatedCompliance, servo_for
 from screwkin.analysis.verdict import verdict_of
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, Perturbed, TrajectoryPath, perturbation_of
-from screwkin.cli.output import aligned, print_json
+from screwkin.cli.output import aligned, print_json, remark
 from screwkin.cli.replay import replay
 from screwkin.cli.simulation import Wish, print_verdict, simulate_to_files
 from screwkin.cli.simulation import engine as engine_named
@@ -120,6 +121,9 @@ def validate(
         print(aligned(validation_numbers(check), "  "))
         print_verdict(check)
         print(f"files in {folder}{'' if folder == beside else f'; validation.json in {beside}'}")
+    drop = clearing_hand_drop(account.robot, loaded, check.self_collisions or ())
+    if drop is not None:
+        remark(f"hands that hang higher clear all links: plan the walk with --set hand_drop={drop:g}")
     return 0 if check.passed else 3
 
 
