@@ -10,6 +10,7 @@ import numpy as np
 from screwkin.algebra.se3 import as_array
 from screwkin.errors import InputError
 from screwkin.ik.all_branches import by_relative, has_branches
+from screwkin.ik.branches import certified_solutions
 from screwkin.ik.closed import recognised
 from screwkin.ik.elimination import BRANCHES
 from screwkin.ik.limb import resting
@@ -74,7 +75,11 @@ def _class_of(robot: Robot, limb: str) -> IkClass:
     tips = as_array(forward(chain.screws, chain.moved(q)[0], chain.tip)[0], (poses,))
     target = tips[:, :3, 3] if position else tips
     guess = np.tile(resting(robot, chain), (poses, 1))
-    found = solve_limb(chain, target, "auto", guess, IkSettings(), (poses,))
+    settings, form = IkSettings(), recognised(chain, position)
+    if form is None:
+        found = solve_limb(chain, target, "auto", guess, settings, (poses,))
+    else:  # so few poses are not worth a program
+        found = certified_solutions(form, target, guess, settings.tolerances)
     if linked:
         found = with_linkages(robot, found, guess)
     solved = float(found.in_limits.any(axis=1).mean()) if poses else float("nan")

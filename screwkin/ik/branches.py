@@ -50,20 +50,20 @@ def closed_solutions(
     if open_.any():
         own = np.broadcast_to(target, (*open_.shape, *((3,) if position else (4, 4))))[open_]
         near = np.broadcast_to(guess, (*open_.shape, guess.shape[-1]))[open_]
-        part = _certified(form, exact_target("T_base_tip", own), near, tolerances, least_squares)
+        part = certified_solutions(form, exact_target("T_base_tip", own), near, tolerances, least_squares)
         for name in KINDS:
             getattr(solutions, name)[open_] = getattr(part, name)
     return solutions
 
 
-def _certified(
+def certified_solutions(
     form: ClosedForm,
     target: Array,
     guess: Array,
     tolerances: tuple[float, float] = (0.0, 0.0),
     least_squares: bool = True,
 ) -> LimbSolutions:
-    """Solutions (B,) by the algorithm over arrays."""
+    """Solutions (B,) by the algorithm over arrays, which needs no program: exact poses, or positions."""
     chain = form.chain
     q, error, valid = solve_closed(form, target, guess, least_squares)
     for k in range(q.shape[1]):
@@ -102,4 +102,4 @@ def certified_pose(chain: SerialChain, target: Array, guess: Array, tolerances: 
     """The best solution (B, n) for targets in the base frame, by the algorithm over arrays."""
     form = recognised(chain, target.ndim == 2)
     assert form is not None
-    return chain.nearest_turn(_certified(form, target, guess, tolerances).q[:, 0], guess)
+    return chain.nearest_turn(certified_solutions(form, target, guess, tolerances).q[:, 0], guess)
