@@ -73,6 +73,7 @@ class Loose:
     """Servos that do nothing."""
 
     name = "loose"
+    relative_rotors = False
     rotor_inertia = np.zeros(1)
 
     def reset(self, q):

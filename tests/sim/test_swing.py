@@ -21,6 +21,7 @@ class Limp:
     """Servos that do nothing."""
 
     name = "limp"
+    relative_rotors = False
 
     def __init__(self, robot: Robot, rotor: float = 0.0) -> None:
         self.rotor_inertia = np.full(len(robot.joints), rotor)
