@@ -107,7 +107,9 @@ def planned(session: Session, plan: Callable[..., Trajectory] | None = None) -> 
     except ScrewkinError as error:
         return replace(session, note=f"not planned: {error}")
     least = 1e3 * float(trajectory.margin.min())
-    return with_motion(session, trajectory, f"planned: margin at least {least:.1f} mm")
+    way = trajectory.T_world_base[-1, :2, 3] - trajectory.T_world_base[0, :2, 3]
+    walked = f"{np.linalg.norm(way):.3f} m in {trajectory.duration:.1f} s"
+    return with_motion(session, trajectory, f"planned: {walked}, margin at least {least:.1f} mm")
 
 
 def _walked(robot: Robot, gait: Gait, steps: int) -> Trajectory:
