@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 import signal
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
-from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
+from contextlib import AbstractContextManager, ExitStack, contextmanager
+from dataclasses import dataclass, replace
 from multiprocessing import active_children, get_context, parent_process
 from threading import Thread
 from typing import Any
@@ -62,30 +62,53 @@ def outcomes(play: Play, rows: Iterable[Row], workers: Workers) -> Iterator[Outc
         rows: to play.
         workers: that play them.
     """
-    waiting = deque(rows)
+    waiting, running = deque(rows), dict[Future[Outcome], Row]()
     while waiting:
-        with workers.opened(workers.width) as pool:
-            suspects = yield from _until_broken(play, waiting, pool, workers)
-        for row in suspects:
-            yield _alone(play, row, workers)
+        try:
+            with workers.opened(workers.width) as pool:
+                yield from _until_broken(play, waiting, running, pool, workers)
+        except BrokenExecutor:
+            suspects = [*running.values()]
+            running.clear()
+            for row in suspects:
+                yield _alone(play, row, workers)
 
 
 def _until_broken(
-    play: Play, waiting: deque[Row], pool: Executor, workers: Workers
-) -> Generator[Outcome, None, list[Row]]:
-    """Outcomes until all rows are done, or the pool breaks; returns the rows that it left then."""
-    running: dict[Future[Outcome], Row] = {}
-    try:
-        while waiting or running:
-            while waiting and len(running) < _AHEAD * workers.width:
-                running[pool.submit(play, waiting[0])] = waiting[0]
-                waiting.popleft()
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                yield _result(future, running[future], workers)
-                del running[future]
-    except BrokenExecutor:
-        pass
-    return list(running.values())
+    play: Play, waiting: deque[Row], running: dict[Future[Outcome], Row], pool: Executor, workers: Workers
+) -> Iterator[Outcome]:
+    """Outcomes until all rows are done; if the pool breaks, ``running`` holds those that it left then."""
+    while waiting or running:
+        while waiting and len(running) < _AHEAD * workers.width:
+            running[pool.submit(play, waiting[0])] = waiting[0]
+            waiting.popleft()
+        for future in wait(running, return_when=FIRST_COMPLETED).done:
+            outcome = _result(future, running[future], workers)
+            del running[future]
+            yield outcome
+
+
+@contextmanager
+def standing(workers: Workers) -> Iterator[Workers]:
+    """The same workers for several calls of ``outcomes``: they start once, and anew after one has died."""
+    pools: list[Executor] = []
+    with ExitStack() as stack:
+
+        @contextmanager
+        def opened(count: int) -> Iterator[Executor]:
+            if count != workers.width:
+                with workers.opened(count) as other:
+                    yield other
+                return
+            if not pools:
+                pools.append(stack.enter_context(workers.opened(count)))
+            try:
+                yield pools[0]
+            except BrokenExecutor:
+                pools.clear()
+                raise
+
+        yield replace(workers, opened=opened)
 
 
 def _alone(play: Play, row: Row, workers: Workers) -> Outcome:

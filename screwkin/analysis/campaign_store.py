@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO, Self
+from typing import Any, BinaryIO, Self
 
-from screwkin.analysis.campaign import Campaign, differences
+from screwkin.analysis.campaign import differences
 from screwkin.analysis.campaign_outcome import Outcome, outcome_from_dict
 from screwkin.errors import InputError, OutputError
 from screwkin.files import atomic_write, read_file, read_json
@@ -50,14 +50,18 @@ class Journal:
 
 
 @contextmanager
-def journal(folder: Path, campaign: Campaign) -> Iterator[Journal]:
+def journal(folder: Path, plan: Mapping[str, Any]) -> Iterator[Journal]:
     """The journal of a campaign in a folder, begun or resumed; one process at a time.
+
+    Args:
+        folder: where it stands.
+        plan: all that decides what its rows say, as JSON data.
 
     Raises:
         InputError: the folder holds another campaign, or a damaged one.
         OutputError: it cannot be written, or another process writes to it.
     """
-    _check_plan(folder / PLAN, campaign)
+    _check_plan(folder / PLAN, plan)
     path = folder / ROWS
     try:
         file = path.open("r+b" if path.exists() else "w+b")
@@ -68,12 +72,11 @@ def journal(folder: Path, campaign: Campaign) -> Iterator[Journal]:
         yield Journal(file, path)
 
 
-def _check_plan(path: Path, campaign: Campaign) -> None:
+def _check_plan(path: Path, plan: Mapping[str, Any]) -> None:
     """Write the plan, or compare it with the one that stands there."""
-    plan = campaign.to_dict()
     if not path.exists():
         with atomic_write(path) as file:
-            file.write(json.dumps(plan, indent=2) + "\n")
+            file.write(json.dumps(dict(plan), indent=2) + "\n")
         return
     there = read_json(read_file(path).decode(errors="replace"))
     differing = differences(plan, there) if isinstance(there, dict) else ["all"]

@@ -12,6 +12,7 @@ from typing import Annotated, Any
 import typer
 
 from screwkin.analysis.campaign import Axes, Campaign, axis_values, check_size, load_seeds, seeds_from
+from screwkin.analysis.campaign_optimum import Search
 from screwkin.analysis.campaign_outcome import Outcome
 from screwkin.analysis.campaign_row import gait_of, played
 from screwkin.analysis.campaign_run import Workers, local_workers, outcomes
@@ -24,6 +25,7 @@ from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, RobotName, settings
 from screwkin.cli.output import aligned, drawn, print_json, progress_bar, remark
 from screwkin.cli.simulation import engine as engine_named
+from screwkin.cli.sweep_optimise import bounds_of, optimise
 from screwkin.cli.walk import limbed
 from screwkin.errors import InputError
 from screwkin.files import atomic_write, atomic_write_bytes, npz_bytes, versions
@@ -75,13 +77,22 @@ def sweep(
             "KEY~VALUE draws a figure, KEY=VALUE is as of validate; may be repeated.",
         ),
     ] = None,
-    engine: Annotated[str, typer.Option(help="As of validate.")] = "auto",
+    engine: Annotated[str | None, typer.Option(help="As of validate; default: auto.")] = None,
     servo: Annotated[str, typer.Option(help="As of validate: rigid, table, or a servo model.")] = RIGID,
     jobs: Annotated[int | None, typer.Option(help="Processes on this computer; default: 1.")] = None,
     cluster: Annotated[
         str | None,
         typer.Option(metavar="ADDRESS", help="Of a dask.distributed scheduler, whose workers play the rows."),
     ] = None,
+    objective: Annotated[
+        str | None,
+        typer.Option(
+            "--optimise",
+            metavar="margin|falls",
+            help="Search the best gait within --set KEY=LEAST:GREATEST, by the plan's margin or by falls.",
+        ),
+    ] = None,
+    evaluations: Annotated[int, typer.Option(help="With --optimise: settings to try, about.")] = 120,
     plots: Annotated[bool, typer.Option("--plots/--no-plots", help="Draw the pictures.")] = True,
     output: OutputFolder = None,
     as_json: AsJson = False,
@@ -90,7 +101,8 @@ def sweep(
 
     Every combination of --set values is a setting; every setting is played with every seed. The same command
     with the same -o goes on where it was stopped, however it was. Files: campaign.json, rows.jsonl (as rows
-    end), rows.csv and rows.npz, settings.csv and pictures. Exit code 1 if a row crashed.
+    end), rows.csv and rows.npz, settings.csv and pictures; with --optimise: optimum.toml, a gait file. Exit
+    code 1 if a row crashed, 3 if no setting of a search is a walk.
     """
     table = load_robot(robot)
     if auto and not table.limbs:
@@ -100,11 +112,12 @@ def sweep(
     _refuse_together({"--seeds": seeds, "--runs": runs})
     _refuse_together({"--seeds": seeds, "--seed": seed})
     _refuse_together({"--jobs": jobs, "--cluster": cluster})
+    bounds, fixed = bounds_of(assignments or []) if objective else ({}, assignments or [])
     axes = _axes(
-        assignments or [],
+        fixed,
         {
             "gait": AUTO if auto else gait or default_gait(table.name),
-            "engine": engine,
+            "engine": engine or ("kinematic" if objective == "margin" else "auto"),
             "servo": servo,
             "perturb": " ".join(perturb) if perturb else AS_PLANNED,
         },
@@ -112,8 +125,11 @@ def sweep(
     campaign = _campaign(table, axes, _seeds(seeds, seed or 0, 1 if runs is None else runs))
     if jobs is not None and jobs < 1:
         raise InputError(f"--jobs {jobs}: at least one process plays the rows")
+    if objective:
+        search = Search(campaign, bounds, objective, evaluations, seed or 0)
+        return optimise(table.name, search, _workers(jobs or 1, cluster), output, as_json)
     with output_folder(output, "sweep", table.name) as folder:
-        with journal(folder, campaign) as rows:
+        with journal(folder, campaign.to_dict()) as rows:
             with _workers(jobs or 1, cluster) as workers:
                 _play(campaign, rows, workers)
             done = rows.outcomes

@@ -42,7 +42,7 @@ def threads(row: Row) -> Outcome:
 
 
 def main() -> None:
-    with journal(Path(sys.argv[1]), PLAN) as rows:
+    with journal(Path(sys.argv[1]), PLAN.to_dict()) as rows:
         left = [row for row in PLAN.rows if row.index not in rows.outcomes]
         for outcome in outcomes(slow_play, left, local_workers(int(sys.argv[2]))):
             rows.append(outcome)

@@ -116,7 +116,7 @@ def test_a_campaign_killed_at_any_moment_resumes_without_loss_or_doubles(tmp_pat
     _wait(lambda: not any(_alive(worker) for worker in workers))
     subprocess.run([sys.executable, "-m", "tests.analysis.campaign_worker", tmp_path, "2"], check=True)
     assert _lines(tmp_path) == 40
-    with journal(tmp_path, PLAN) as rows:
+    with journal(tmp_path, PLAN.to_dict()) as rows:
         assert [rows.outcomes[row.index] for row in PLAN.rows] == [play(row) for row in PLAN.rows]
 
 

@@ -8,6 +8,8 @@ import json
 import numpy as np
 import pytest
 
+import screwkin as sk
+
 GRID = ("sweep", "bioloid", "--gait", "walk", "--engine", "kinematic", "--set", "steps=1", "--set", "rate=20")
 
 
@@ -70,3 +72,31 @@ def test_a_folder_of_another_campaign_is_left_as_it_is(cli, tmp_path, refused):
     message = refused(cli(*GRID, "-o", "c"), 2)
     assert "another campaign" in message
     assert [path.name for path in (tmp_path / "c").iterdir()] == ["campaign.json"]
+
+
+def test_the_best_gait_of_a_search_is_a_gait_file(cli, tmp_path):
+    words = (*GRID, "--optimise", "margin", "--set", "sway=0.5:1.5", "--evaluations", 12)
+    called = cli(*words, "-o", "c", "--json")
+    assert called.code == 0, called.err
+    data = called.data
+    assert data["evaluations"] == data["rows"] == 13
+    assert data["cost"] < data["first"]
+    gait = sk.load_gait(tmp_path / "c" / "optimum.toml")
+    assert gait.sway == data["optimum"]["sway"]
+    walk = sk.walk(sk.load_robot("bioloid"), gait)
+    assert -1e3 * walk.margin.min() == pytest.approx(data["cost"], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--set", "sway=a:b"), "no bounds"),
+        (("--set", "sway=1:2", "--set", "sway=1:3"), "given twice"),
+        (("--set", "swa=1:2"), "no such parameter"),
+        (("--set", "Tc=0:2"), "Tc"),
+        (("--set", "Tc=1,2", "--set", "sway=1:2"), "Tc=LEAST:GREATEST"),
+    ],
+)
+def test_a_search_that_is_none_is_refused_before_it_begins(cli, tmp_path, refused, words, message):
+    assert message in refused(cli(*GRID, "--optimise", "margin", *words, "-o", "c"), 2)
+    assert not (tmp_path / "c").exists()
