@@ -275,20 +275,21 @@ def _print(campaign: Campaign, total: Tally, each: Sequence[Tally], pairs: Seque
     print(aligned(shown, "  "))
     if len(lines) > len(shown):
         print(f"  … {len(lines) - SHOWN - 1} more settings in settings.csv")
-    for pair in pairs[:SHOWN]:
+    for pair in [pair for pair in pairs if pair.pairs][:SHOWN]:
         print(
             f"  setting {pair.second} against {pair.first} on {pair.pairs} equal seeds: alone fell "
             f"{pair.only_second} against {pair.only_first}, p = {pair.p:.2g} (McNemar)"
         )
 
 
-_HEAD = ("rows", "falls", "95 % interval", "pass", "refused", "crashed", "margin")
+_HEAD = ("rows", "stood", "fell", "95 % interval", "pass", "planned", "refused", "crashed", "margin")
 
 
 def _cells(t: Tally) -> tuple[str, ...]:
     interval = "" if t.interval is None else f"{100 * t.interval[0]:.1f} to {100 * t.interval[1]:.1f} %"
     margin = "" if t.margin_mm is None else f"{t.margin_mm:.1f} mm"
-    return str(t.rows), str(t.fell), interval, str(t.passed), str(t.refused), str(t.crashed), margin
+    counts = (str(count) for count in (t.passed, t.planned, t.refused, t.crashed))
+    return str(t.rows), str(t.stood), str(t.fell), interval, *counts, margin
 
 
 def _crashes(done: Mapping[int, Outcome]) -> list[str]:
