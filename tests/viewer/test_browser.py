@@ -110,7 +110,7 @@ def coloured(page):
     return (np.ptp(pixels, axis=2) > 40).mean() > 0.003
 
 
-def test_a_walk_plays_a_joint_is_dragged_and_another_stride_planned(page):
+def test_a_walk_plays_and_another_stride_is_planned(page):
     with viewing("bioloid", "--steps", "2") as url:
         page.goto(url)
         reads(page, r"planned: [\d.]+ m in [\d.]+ s, margin at least [\d.]+ mm")
@@ -124,13 +124,6 @@ def test_a_walk_plays_a_joint_is_dragged_and_another_stride_planned(page):
         drag(page, "stride [m]", 0.2)
         after = reads(page, rf"planned: (?!{re.escape(before)} )([\d.]+) m in")[1]
         assert float(after) < float(before), "shorter steps"
-        tab(page, "joints")
-        knee = page.locator("label:text-is('right_knee [rad]')")
-        row = knee.locator("xpath=ancestor::*[.//*[@role='slider']][1]")
-        was = row.locator("input").first.input_value()
-        drag(page, "right_knee [rad]", 0.9)
-        page.wait_for_timeout(3000)
-        assert row.locator("input").first.input_value() != was
 
 
 def test_a_linkage_follows_the_joint_that_is_dragged(page):
