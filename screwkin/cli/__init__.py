@@ -120,10 +120,7 @@ def _dispatch(words: Sequence[str]) -> int:
 
     from screwkin.cli.output import remarks_of_robots
 
-    verb = getattr(import_module(f"screwkin.cli.{name}"), name)
-    app = verb if isinstance(verb, typer.Typer) else typer.Typer(**APP)
-    if app is not verb:
-        app.command(name)(verb)
+    app = verb_app(name)
     try:
         with remarks_of_robots():
             code: Any = app(args=list(words[1:]), prog_name=f"screwkin {name}", standalone_mode=False)
@@ -132,6 +129,18 @@ def _dispatch(words: Sequence[str]) -> int:
     if code == _INTERRUPTED:  # typer's answer to an interrupt, older versions abort
         raise KeyboardInterrupt
     return int(code or 0)
+
+
+def verb_app(name: str) -> Any:
+    """The typer application of a verb."""
+    import typer
+
+    verb = getattr(import_module(f"screwkin.cli.{name}"), name)
+    if isinstance(verb, typer.Typer):
+        return verb
+    app = typer.Typer(**APP)
+    app.command(name)(verb)
+    return app
 
 
 def _report(error: Exception, words: Sequence[str], debug: bool) -> int:

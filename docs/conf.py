@@ -1,0 +1,58 @@
+"""Sphinx builds the site: python -m sphinx -W -b html docs build/site (extra "docs")."""
+
+from __future__ import annotations
+
+import os
+import re
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE.parent))
+sys.path.insert(0, str(HERE))
+os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])  # of shell cells
+
+import references
+
+from screwkin import __version__
+
+project = "screwkin"
+author = "screwkin contributors"
+copyright = author
+release = version = __version__
+
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+exclude_patterns = ["images/README.md", "**/__pycache__"]
+html_theme = "furo"
+html_title = "screwkin"
+
+myst_heading_anchors = 4
+myst_enable_extensions = ["colon_fence"]
+suppress_warnings = ["myst.header", "misc.highlighting_failure"]
+
+nb_execution_mode = "force"  # every code cell of the tutorials runs at every build
+nb_execution_raise_on_error = True
+nb_execution_in_temp = True
+nb_execution_timeout = 600
+nb_merge_streams = True
+
+autodoc_typehints = "none"  # docstrings give shapes and units, which types do not
+autodoc_member_order = "bysource"
+
+
+def absolute_values(app, what, name, obj, options, lines) -> None:
+    """Bars of docstrings are absolute values, not substitutions."""
+    lines[:] = [line.replace("|", r"\|") for line in lines]
+
+
+def links_out_of_the_site(app, name, source) -> None:
+    """Links to files of the checkout that are no pages become their names."""
+    if "/" not in name:
+        source[0] = re.sub(r"\[([^\]]*)\]\(\.\./([\w/.-]+)\)", r"\1 (`\2`)", source[0])
+
+
+def setup(app) -> None:
+    """Write the pages of reference from the code before Sphinx reads the folder."""
+    references.write_all(HERE / "reference")
+    app.connect("source-read", links_out_of_the_site)
+    app.connect("autodoc-process-docstring", absolute_values)

@@ -1,0 +1,280 @@
+"""Pages of reference, written from the code itself: keys of tables and gaits, commands, functions."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import MISSING, fields
+from pathlib import Path
+from typing import Any
+
+import typer
+
+import screwkin as sk
+from screwkin.analysis.verdict import Criteria, Measured, Verdict
+from screwkin.cli import VERBS, verb_app
+from screwkin.files import atomic_write
+from screwkin.gait.keypoints import CHANNELS
+from screwkin.gait.keys import KEYS
+from screwkin.gait.preview_plan import SETTINGS
+from screwkin.gait.relative import NOMINAL
+from screwkin.model import schema
+from screwkin.motors.records import Friction, Motor, MotorModel
+from screwkin.servo import model_file, servo_map
+from screwkin.sim.perturbation import Perturbation
+
+TABLES_BEGIN = """\
+A table is a TOML file. All points, axes and frames are those of the zero pose, in base axes from the base
+origin. Any number may be arithmetic over `[parameters]`, such as `"thigh + 2*mm"`; `pi`, `deg` and `mm`
+are known. Unknown keys are errors. `[waist]` is the frame that gaits steer, by default midway between the
+hips."""
+GAITS_BEGIN = """\
+A gait is a TOML file. `screwkin gaits` lists the bundled ones, `screwkin walk ROBOT --gait FILE` walks
+it, and `--set key=value` changes any key for one walk."""
+CHANNELS_BEGIN = """\
+Key points: `at` in steps, and the `value` there. A gait of kind `geometric` needs all channels, others
+the two of the feet. `swing` holds for the swinging foot only, `advance` gains one a step, `alternate`
+changes its sign with every step, `repeat` does not."""
+COMMANDS_BEGIN = """\
+Exit codes: 0 good; 1 unexpected; 2 bad input or usage; 3 the answer is no; 4 refused for safety; 130
+interrupted. `--json` prints one JSON object and nothing else; `--debug` shows the traceback of an error;
+`-o DIR` says where files go."""
+
+CHANNEL_MEANINGS = {
+    "foot_progress": "share of the way from foothold to foothold",
+    "foot_height": "height of the sole above the floor [m]",
+    "waist_progress": "share of the way between the waist's places at the ends of a step",
+    "waist_side": "towards the supporting foot [m]",
+    "hand_forward": "forward of the shoulder, of the hand on the side of the swinging foot [m]",
+    "hand_raise": "above hand_drop below the shoulder, both hands [m]",
+}
+LENGTH_MEANINGS = {
+    "leg": "from hip to ankle, stretched",
+    "hip": "distance of the hips from each other",
+    "sole": "length of a sole",
+    "waist": "height of the waist above the hips",
+    "arm": "from shoulder to hand, stretched",
+}
+PREVIEW_MEANINGS = {
+    "dsp": "share of Tc with both feet on the floor",
+    "horizon": "how far the controller looks ahead [s]",
+    "Qe": "weight of the ZMP error",
+    "Qx": "weight of changes of the state",
+    "R": "weight of changes of the jerk",
+}
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A Markdown table; bars in cells are escaped."""
+    cells = [[str(cell).replace("|", "\\|").replace("\n", " ") for cell in row] for row in (head, *rows)]
+    lines = [f"| {' | '.join(row)} |" for row in cells]
+    return "\n".join([lines[0], "|" + "---|" * len(head), *lines[1:]])
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(f"`{name}`" for name in names) + "."
+
+
+def code(value: object) -> str:
+    """A value as code; a dash for none."""
+    return "-" if value is None or value in ("", ()) else f"`{value}`"
+
+
+def robot_tables() -> str:
+    """Every key of a robot's table."""
+    parts = ["# Robot and mechanism tables", TABLES_BEGIN, "Keys at the top: " + _listed(schema.TABLES)]
+    parts += [
+        _row_model(f"[{'[' * (name != 'robot')}{name}{']' * (name != 'robot')}]", kind)
+        for name, kind in {"robot": schema.RobotRow, **schema.ROWS}.items()
+    ]
+    parts.append(_row_model("[[limb]] with mirror", schema.MirrorRow))
+    inline = {
+        "frame": schema.FrameRow,
+        "inertia": schema.InertiaRow,
+        "boxes": schema.BoxRow,
+        "shapes": schema.ShapeRow,
+        "mimic": schema.MimicRow,
+        "spring": schema.SpringRow,
+    }
+    parts += [_row_model(f"inline: {name}", kind) for name, kind in inline.items()]
+    parts += [
+        "## [servos]",
+        _doc(servo_map),
+        "Keys: " + _listed(servo_map.KEYS),
+    ]
+    return "\n\n".join(parts)
+
+
+def _row_model(title: str, kind: type[schema.Row]) -> str:
+    rows = [
+        (
+            f"`{name}`",
+            field.description,
+            "must be given" if field.is_required() else code(_shown(field.default)),
+        )
+        for name, field in kind.model_fields.items()
+    ]
+    text = _doc(kind).partition(": ")[2] if _doc(kind).startswith("[") else _doc(kind)
+    return f"## {title}\n\n{text[:1].upper()}{text[1:]}\n\n{table(('key', 'what', 'default'), rows)}"
+
+
+def _shown(value: object) -> object:
+    triple = [getattr(value, name, None) for name in "xyz"]
+    return triple if None not in triple else value
+
+
+def gaits() -> str:
+    """Every key of a gait's file."""
+    rows = [
+        (
+            f"`{name}`",
+            key.meaning + (f": {', '.join(f'`{c}`' for c in key.choices)}" if key.choices else ""),
+            key.unit or "-",
+            "must be given" if key.default is None else code(key.default),
+        )
+        for name, key in KEYS.items()
+    ]
+    channels = [(f"`{name}`", CHANNEL_MEANINGS[name], kind) for name, kind in CHANNELS.items()]
+    lengths = [(f"`{name}`", LENGTH_MEANINGS[name]) for name in NOMINAL]
+    preview = [(f"`{name}`", PREVIEW_MEANINGS[name]) for name in SETTINGS]
+    return "\n\n".join(
+        [
+            "# Gait files",
+            GAITS_BEGIN,
+            "## [gait]",
+            table(("key", "what", "unit", "default"), rows),
+            "## [parameters]",
+            "Numbers of your own, for formulas anywhere in the file. Gaits of kind `preview` and "
+            "`footsteps` read these:",
+            table(("parameter", "what"), preview),
+            "## Lengths of the robot",
+            "Formulas may use lengths of the robot at hand, so that one gait fits many: "
+            '`stride = "0.3*leg"`. A walk writes their values to `[lengths]`.',
+            table(("length", "what"), lengths),
+            "## [channel.NAME]",
+            CHANNELS_BEGIN,
+            table(("channel", "what", "goes on"), channels),
+            "## [[foothold]]",
+            "Steps of kind `footsteps`: `x`, `y` [m], `yaw` [rad], perhaps `z` [m], of the foot that swings.",
+        ]
+    )
+
+
+def commands() -> str:
+    """Every verb with its arguments and options."""
+    parts = [
+        "# Command line",
+        COMMANDS_BEGIN,
+    ]
+    return "\n\n".join(
+        [
+            *parts,
+            *(
+                part
+                for verb in VERBS
+                for part in _verb(f"screwkin {verb}", typer.main.get_command(verb_app(verb)))
+            ),
+        ]
+    )
+
+
+def _verb(name: str, command: Any) -> Iterator[str]:
+    """A verb and the verbs in it: its help, arguments and options."""
+    yield f"## {name}"
+    yield inspect.cleandoc(command.help or "").replace("<", "\\<")
+    rows = [
+        (
+            code(
+                parameter.metavar or parameter.name
+                if parameter.param_type_name == "argument"
+                else ", ".join([*parameter.opts, *parameter.secondary_opts])
+            ),
+            parameter.help or "-",
+        )
+        for parameter in command.params
+        if "--help" not in parameter.opts and not getattr(parameter, "hidden", False)
+    ]
+    if rows:
+        yield table(("argument or option", "what"), rows)
+    for part, inner in getattr(command, "commands", {}).items():
+        yield from _verb(f"{name} {part}", inner)
+
+
+def records() -> str:
+    """Fields of what files hold besides: verdicts, perturbations, motors, servo models."""
+    parts = ["# Verdicts, perturbations and motors"]
+    titles = {
+        Verdict: "validation.json",
+        Criteria: "Criteria of a verdict",
+        Perturbation: "[perturbation]",
+        MotorModel: "Files of servo models",
+        Motor: "[motor]",
+        Friction: "[motor.friction]",
+    }
+    for kind, title in titles.items():
+        rows = [(code(f.name), _default(f)) for f in fields(kind)]
+        texts = (
+            [_doc(kind)]
+            + ([_doc(Measured)] if kind is Verdict else [])
+            + ([_doc(model_file)] if kind is MotorModel else [])
+        )
+        parts += [f"## {title}", *texts, table(("field", "default"), rows)]
+    return "\n\n".join(parts)
+
+
+def _default(field: Any) -> str:
+    value = field.default_factory() if field.default_factory is not MISSING else field.default
+    return "-" if value is MISSING or hasattr(value, "__dataclass_fields__") else code(value)
+
+
+def _doc(thing: Any) -> str:
+    """A docstring as Markdown: indented blocks become code, double backticks single ones."""
+    text = inspect.cleandoc(thing.__doc__ or "").replace("``", "`").replace("[[", "\\[[")
+    blocks = []
+    for block in text.split("\n\n"):
+        inner = inspect.cleandoc("\n" + block).replace("\\[[", "[[")
+        language = "text" if "…" in inner else "toml"
+        blocks.append(f"```{language}\n{inner}\n```" if block.startswith("    ") else block)
+    return "\n\n".join(blocks)
+
+
+def functions() -> str:
+    """Every name of the package's root, by Sphinx's reading of its docstring."""
+    names = [
+        (name, "autoclass" if inspect.isclass(getattr(sk, name)) else "autofunction") for name in sk.__all__
+    ]
+    parts = [
+        "# Python",
+        "Every name of `import screwkin as sk`. Arrays may have leading batch dimensions; NumPy in, NumPy "
+        "out, JAX in, JAX out.",
+        "## Functions",
+    ]
+    parts += [_auto(name, kind) for name, kind in names if kind == "autofunction"]
+    return "\n\n".join(
+        [*parts, "## Records", *(_auto(name, kind) for name, kind in names if kind == "autoclass")]
+    )
+
+
+def _auto(name: str, kind: str) -> str:
+    members = "\n   :members:" if kind == "autoclass" else ""
+    return f"### {name}\n\n```{{eval-rst}}\n.. {kind}:: screwkin.{name}{members}\n```"
+
+
+PAGES: Mapping[str, Any] = {
+    "tables": robot_tables,
+    "gaits": gaits,
+    "command-line": commands,
+    "records": records,
+    "python": functions,
+}
+"""What writes each page."""
+
+
+def write_all(folder: Path) -> None:
+    """Write all pages; those that stay the same keep their time, so that Sphinx reads changed ones only."""
+    folder.mkdir(exist_ok=True)
+    for name, written in PAGES.items():
+        path, text = folder / f"{name}.md", written() + "\n"
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            with atomic_write(path) as file:
+                file.write(text)
