@@ -25,6 +25,7 @@ extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 exclude_patterns = ["images/README.md", "**/__pycache__"]
 html_theme = "furo"
 html_title = "screwkin"
+smartquotes = False  # an option is no dash
 
 myst_heading_anchors = 4
 myst_enable_extensions = ["colon_fence"]

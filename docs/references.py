@@ -61,12 +61,16 @@ PREVIEW_MEANINGS = {
     "Qe": "weight of the ZMP error",
     "Qx": "weight of changes of the state",
     "R": "weight of changes of the jerk",
+    "ahead": "how far the ZMP lies ahead of the ankle, as a share of the sole's middle; by default 1",
+    "inward": "share of the way from the sole's middle to its inner edge; by default 0",
+    "stand": "steps during which the robot stands before the first step and after the last; by default 1",
 }
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """A Markdown table; bars in cells are escaped."""
-    cells = [[str(cell).replace("|", "\\|").replace("\n", " ") for cell in row] for row in (head, *rows)]
+    signs = {"|": "\\|", "\n": " ", "<": "\\<"}
+    cells = [[str(cell).translate(str.maketrans(signs)) for cell in row] for row in (head, *rows)]
     lines = [f"| {' | '.join(row)} |" for row in cells]
     return "\n".join([lines[0], "|" + "---|" * len(head), *lines[1:]])
 
@@ -136,7 +140,7 @@ def gaits() -> str:
     ]
     channels = [(f"`{name}`", CHANNEL_MEANINGS[name], kind) for name, kind in CHANNELS.items()]
     lengths = [(f"`{name}`", LENGTH_MEANINGS[name]) for name in NOMINAL]
-    preview = [(f"`{name}`", PREVIEW_MEANINGS[name]) for name in SETTINGS]
+    preview = [(f"`{name}`", PREVIEW_MEANINGS[name]) for name in dict.fromkeys([*SETTINGS, *PREVIEW_MEANINGS])]
     return "\n\n".join(
         [
             "# Gait files",
