@@ -140,7 +140,9 @@ def gaits() -> str:
     ]
     channels = [(f"`{name}`", CHANNEL_MEANINGS[name], kind) for name, kind in CHANNELS.items()]
     lengths = [(f"`{name}`", LENGTH_MEANINGS[name]) for name in NOMINAL]
-    preview = [(f"`{name}`", PREVIEW_MEANINGS[name]) for name in dict.fromkeys([*SETTINGS, *PREVIEW_MEANINGS])]
+    preview = [
+        (f"`{name}`", PREVIEW_MEANINGS[name]) for name in dict.fromkeys([*SETTINGS, *PREVIEW_MEANINGS])
+    ]
     return "\n\n".join(
         [
             "# Gait files",
