@@ -113,7 +113,7 @@ def validation_numbers(check: Validation) -> list[Number]:
         )
     if check.joint_stiffness is not None:
         k = sorted(set(check.joint_stiffness.values()))
-        values = f"{k[0]:g}" if len(k) == 1 else f"{k[0]:g} to {k[-1]:g}"
+        values = f"{k[0]:.4g}" if len(k) == 1 else f"{k[0]:.4g} to {k[-1]:.4g}"
         rows.append(
             Number(
                 "elastic servos", f"{values} N m/rad", f"compensation in the commands: {check.compensation}"

@@ -58,9 +58,12 @@
     scene.add(lamp);
     const world = new THREE.Group();
     scene.add(world);
-    const floor = new THREE.GridHelper(80 * tile, 80, 0x7d8592, 0xaab1bc);
-    floor.rotation.x = Math.PI / 2;
-    world.add(floor);
+    const lines = []; // of the floor, tile by tile: software renderers lose lines that end behind the camera
+    for (let i = -40; i <= 40; i++) for (let j = -40; j < 40; j++)
+      lines.push(i * tile, j * tile, 0, i * tile, (j + 1) * tile, 0, j * tile, i * tile, 0, (j + 1) * tile, i * tile, 0);
+    const tiles = new THREE.BufferGeometry();
+    tiles.setAttribute("position", new THREE.BufferAttribute(new Float32Array(lines), 3));
+    world.add(new THREE.LineSegments(tiles, new THREE.LineBasicMaterial({ color: 0xaab1bc })));
     const bodies = links.map(() => { const g = new THREE.Group(); g.matrixAutoUpdate = false; world.add(g); return g; });
     const still = new THREE.Group();
     world.add(still);
