@@ -49,6 +49,7 @@ with = { limb = "left_leg", heights = [0.4], resolution = 0.05 }
 }
 """What verbs read, by name."""
 VERBS = {
+    "doctor": "doctor",
     "robots": "robots",
     "gaits": "gaits",
     "info": "info poppy12",
@@ -97,6 +98,7 @@ NEEDS = {
     "view": ["viser"],
     "demo": ["mujoco"],
 }
+ENGINES = {"mujoco", "pybullet"}
 VERDICT = {"send", "send --virtual"}
 """What is refused, with exit code 4, where there is no verdict."""
 DRAWING = {"compare", "sweep", "walk", "validate kinematic", "workspace", "stiffness", "reproduce"}
@@ -126,6 +128,8 @@ def expected(name: str, absent: Collection[str]) -> tuple[int, str]:
     """Exit code of a verb without some libraries, and the package that it asks for."""
     if name in VERDICT and expected("validate", absent)[1]:
         return 4, ""
+    if name == "doctor" and {*absent} >= ENGINES:
+        return 3, ""
     for library in NEEDS.get(name, []):
         if library in absent:
             return 2, PACKAGES[library]

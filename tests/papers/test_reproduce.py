@@ -204,7 +204,7 @@ def test_the_pages_show_values_reasons_and_pictures_and_stand_alone(tmp_path):
     assert (tmp_path / "01-feet-along-z.png").read_bytes().startswith(b"\x89PNG")
     assert "A &lt;small&gt; paper" in html
     assert "<code>paper</code>" in html
-    assert re.findall(r'src="([^"]{15})', html) == ["data:image/png;"]
+    assert re.findall(r'src="([^"]{15})', html) == ["data:image/webp"]
     assert "http" not in html
     assert "screwkin reproduce small" in text
     assert "screwkin reproduce small" in html

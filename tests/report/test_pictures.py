@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from screwkin.algebra.se3 import as_array
 from screwkin.errors import InputError
 from screwkin.report import balance, frames, motion, simulation
 from screwkin.report.pictures import save_pictures
@@ -197,9 +198,10 @@ def test_a_link_without_boxes_is_drawn_as_a_line_to_what_it_carries(account, rob
     with styled():
         figure = frames.frames_drawn(replace(account, robot=bare))
     drawn = [line for line in figure.axes[0].get_lines() if len(line.get_xdata()) == 2]
-    thigh = 0.0773829
+    hips = [as_array(joint.screw.s0) for joint in robot.tree if joint.parent == robot.base_link]
+    longest = max(np.linalg.norm(one - hips[0]) for one in hips)  # from the first hip to the other shoulder
     lengths = [np.hypot(*np.ptp(line.get_xydata(), axis=0)) for line in drawn]
-    assert max(lengths[1:]) <= thigh + 0.02
+    assert max(lengths[1:]) <= longest
     assert len(drawn) > 8
 
 
