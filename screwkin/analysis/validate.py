@@ -127,7 +127,7 @@ def validate(
     walk = stabilised(robot, trajectory) if feedback else None
     if walk is not None:
         compile_program(walk.program)
-    commands = motion or (trajectory if feedback else compliance.commands(robot, trajectory))
+    commands = motion or compliance.commands(robot, trajectory)
     start = (motion or intended(robot, trajectory)).q[0]
     names, terrain = engines_for(engine, robot, compliance), ground_of(trajectory)
     ways = _FINER if check_solver and names != ("kinematic",) else {"usual": Refinement()}
@@ -138,7 +138,8 @@ def validate(
         nonlocal done
         loop = None
         if walk is not None:
-            loop = Loop(WalkController(walk), Senses(robot, perturbation, walk.body.tips))
+            controller = WalkController(walk, commands=commands if motion is None else None)
+            loop = Loop(controller, Senses(robot, perturbation, walk.body.tips))
         backend = opened(robot, name, compliance, gui and not done, finer, terrain, perturbation)
         try:
             run = simulate(

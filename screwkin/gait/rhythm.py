@@ -77,14 +77,16 @@ def rhythm_of(plan: Trajectory, tips: tuple[str, str], swings: list[Swing], sole
     if not ground_of(plan).flat or np.ptp(soles) > _LEVEL:
         raise InputError("a stabiliser walks on level ground only; plan the walk without slope and blocks")
     aloft = float(np.median([time[s.lands + 1] - time[s.lifts] for s in swings]))
-    period = float(np.median(np.diff([time[s.lands + 1] for s in swings])))
+    first, last = swings[0], swings[-1]
+    gone = time[[last.lifts, last.lands + 1]] - time[[first.lifts, first.lands + 1]]
+    period = float(np.mean(gone)) / (len(swings) - 1)
     tops = [plan.T_world_tip[tips[s.foot]][s.lifts : s.lands + 1, 2, 3].max() for s in swings]
     feet = [_place(plan, tip, 0) for tip in tips]
     low, high = sole.min(axis=0), sole.max(axis=0)
     (ahead, aside), half = 0.5 * (low + high), 0.5 * (high - low)
     double = max(2 * CYCLE / period, 1.0 - aloft / period)
     walking = slice(swings[0].lifts, swings[-1].lands)
-    beginning = float(time[swings[0].lifts] - time[0]) - 0.5 * double * period
+    beginning = float(time[swings[0].lifts] - time[0]) - double * period
     com_height = float(np.mean(plan.com[walking, 2])) - level
     shift = _SHIFTS / float(np.sqrt(GRAVITY / com_height))
     if beginning < shift:
@@ -157,6 +159,7 @@ def start_of(plan: Trajectory, body: Body, rhythm: Rhythm, swings: list[Swing]) 
         error=still,
         slope=still,
         lean=still,
+        lasting=still,
         waist=(float(waist[0, 3]), float(waist[1, 3])),
     )
 

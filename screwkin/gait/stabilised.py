@@ -17,7 +17,18 @@ from screwkin.compiler.run import run
 from screwkin.errors import InputError
 from screwkin.gait.intended import intended
 from screwkin.gait.rhythm import CYCLE, rhythm_of, share_of, start_of, steps_of, swings_of
-from screwkin.gait.stabiliser import STEPPING, Ahead, Body, Memory, Senses, Walker, body_of, cycle
+from screwkin.gait.stabiliser import (
+    STARTING,
+    STEPPING,
+    STOPPING,
+    Ahead,
+    Body,
+    Memory,
+    Senses,
+    Walker,
+    body_of,
+    cycle,
+)
 from screwkin.gait.stabiliser_law import Gains, Rhythm, of_row, row, size_of
 from screwkin.gait.stance import stance_of
 from screwkin.kinematics.body import center_of_mass, frame_pose
@@ -87,7 +98,7 @@ class StabilisedWalk:
     def inputs(self, course: Course, felt: Felt, feedback: bool = True) -> dict[str, Array]:
         """What the program takes for a cycle, by name."""
         k = course.landed
-        now = min(round(course.time / float(self.rhythm.dt)) + 1, len(self.heights) - 1)
+        now = min(self.phase(course) + 1, len(self.heights) - 1)
         q = np.where(self._legs, course.q, self.q[now])
         coming = np.zeros((2, 3))
         rows = self.steps[k : k + 2]
@@ -105,6 +116,22 @@ class StabilisedWalk:
             "command": q,
             "feedback": np.array([float(feedback)]),
         }
+
+    def phase(self, course: Course) -> int:
+        """The plan's cycle in which a course is, whose steps may last longer or shorter than planned."""
+        mode, tau, period = course.memory[:3].tolist()
+        T = float(self.rhythm.period)
+        if mode == STARTING:
+            time = tau
+        else:
+            since = tau if mode == STOPPING else min(tau / period, 1.0) * T
+            time = float(self.rhythm.beginning) + course.landed * T + since
+        return min(round(time / float(self.rhythm.dt)), len(self.heights) - 1)
+
+    def allowance(self, commands: Trajectory) -> Array:
+        """What commands for servos add to the plan's joint positions (K, n), by cycle."""
+        times = commands.time[0] + float(self.rhythm.dt) * np.arange(len(self.q))
+        return np.asarray(commands.sampled(times)[0] - self.q)
 
     @cached_property
     def _legs(self) -> Array:
@@ -212,6 +239,7 @@ def cycle_in_a_step(robot: Robot) -> dict[str, Array]:
         error=(0.001, 0.001),
         slope=still,
         lean=(0.01, -0.02),
+        lasting=still,
         waist=(0.0, 0.5 * apart),
     )
     lean = as_array(rotate(X, 0.02) @ rotate(Y, -0.03))

@@ -52,8 +52,9 @@ class Memory:
     mode: starting, stepping or stopping; tau: time in it [s]; period: of the step in course [s]; side: of the
     foot that stands, +1 left; stance, other: feet on the floor, the other one where it stood at last (x, y
     [m], yaw [rad]); com, rate, zmp: of the internal pendulum; held, place: see ``landing``; seen: 1 if the
-    cycle before measured; gap, gap_rate: of the CoM from the pendulum, measured; error: of the DCM; slope,
-    lean: of the floor and of the trunk beside it, about x and y [rad]; waist: x, y.
+    cycle before measured; gap, gap_rate: of the CoM from the pendulum, measured, beside what lasts of it
+    (lasting); error: of the DCM; slope, lean: of the floor and of the trunk beside it, about x and y [rad];
+    waist: x, y.
     """
 
     mode: Scalar
@@ -73,6 +74,7 @@ class Memory:
     error: Pair
     slope: Pair
     lean: Pair
+    lasting: Pair
     waist: Pair
 
 
@@ -221,29 +223,28 @@ class Walker:
     gains: Gains
 
 
-def _estimated(
-    rhythm: Rhythm, gains: Gains, memory: Memory, seen: _Seen
-) -> tuple[Pair, Pair, Pair, Pair, Pair]:
-    """Gap, its rate and the DCM's error; slope and lean: all filtered."""
+def _estimated(rhythm: Rhythm, gains: Gains, memory: Memory, seen: _Seen) -> tuple[Pair, ...]:
+    """Gap, its rate and the DCM's error; slope, lean and what lasts of the gap: all filtered."""
     good, dt = seen.valid > 0.5, rhythm.dt
-    gap = minus(seen.com, memory.com)
+    off = minus(seen.com, memory.com)
+    lasting = plus(memory.lasting, minus(off, memory.lasting), dt / gains.level_time)
+    gap = minus(off, lasting)
     old = either(memory.seen > 0.5, memory.gap, gap)
     speed = within(((gap[0] - old[0]) / dt, (gap[1] - old[1]) / dt), (-0.6, -0.6), (0.6, 0.6))
     rate = plus(memory.gap_rate, minus(speed, memory.gap_rate), gains.rate_filter)
     far = gains.largest
-    error = within(plus(gap, rate, 1.0 / rhythm.w), (-far, -far), (far, far))
+    whole = plus(gap, rate, 1.0 / rhythm.w)
+    beyond = minus(whole, within(whole, (-gains.dead, -gains.dead), (gains.dead, gains.dead)))
+    error = within(beyond, (-far, -far), (far, far))
     R = seen.attitude
     about = atan2(-R.z.y, R.z.z), atan2(R.z.x, R.z.z)
     bounded = within(about, (-0.1, -0.1), (0.1, 0.1))
     slope = plus(memory.slope, minus(bounded, memory.slope), dt / gains.level_time)
     beside = within(minus(about, slope), (-0.25, -0.25), (0.25, 0.25))
     lean = plus(memory.lean, minus(beside, memory.lean), gains.lean_filter)
-    news, olds = (
-        (gap, rate, error, slope, lean),
-        (memory.gap, memory.gap_rate, memory.error, memory.slope, memory.lean),
-    )
-    gap, rate, error, slope, lean = (_pair(either(good, new, o)) for new, o in zip(news, olds, strict=True))
-    return gap, rate, error, slope, lean
+    news = gap, rate, error, slope, lean, lasting
+    olds = memory.gap, memory.gap_rate, memory.error, memory.slope, memory.lean, memory.lasting
+    return tuple(_pair(either(good, new, old)) for new, old in zip(news, olds, strict=True))
 
 
 def _pair(two: Sequence[Scalar]) -> Pair:
@@ -266,10 +267,10 @@ def cycle(
     rhythm, gains = walker.rhythm, walker.gains
     w, dt = rhythm.w, rhythm.dt
     starting, stepping = memory.mode < 0.5, (memory.mode > 0.5) & (memory.mode < 1.5)
-    swings = stepping & (memory.tau > 0.5 * rhythm.both)
+    swings = stepping & (memory.tau > rhythm.both)
     seen = _measured(walker.body, rhythm, memory, senses, swings)
     seen = _Seen(seen.com, seen.attitude, seen.valid * feedback)
-    gap, gap_rate, error, slope, lean = _estimated(rhythm, gains, memory, seen)
+    gap, gap_rate, error, slope, lean, lasting = _estimated(rhythm, gains, memory, seen)
     pulls = where(starting, 0.0, seen.valid) * w
     rate = tuple(v + pulls * k * e for v, k, e in zip(memory.rate, gains.pull, error, strict=True))
     origin, yaw = (memory.stance[0], memory.stance[1]), memory.stance[2]
@@ -289,7 +290,7 @@ def cycle(
     waist, joints = _whole(walker.body, ahead.height, now, swing, com, memory.waist, q)
     after = Memory(
         now.mode, now.tau + dt, now.period, now.side, now.stance, now.other, com, rate, zmp, decided.held,
-        now.place, seen.valid, gap, gap_rate, error, slope, lean, waist,
+        now.place, seen.valid, gap, gap_rate, error, slope, lean, lasting, waist,
     )  # fmt: skip
     return after, joints, where(now.lands, 1.0, 0.0)
 
@@ -328,7 +329,7 @@ def _now(
     place = either(begins, nominal_place(rhythm, side, first), place)
     place = either(lands, nominal_place(rhythm, -side, second), place)
     T, both = rhythm.period, rhythm.both
-    share = clipped((tau - 0.5 * both) / larger(decided.period - both, 1e-3), 0.0, 1.0)
+    share = clipped((tau - both) / larger(decided.period - both, 1e-3), 0.0, 1.0)
     going = where(stepping & ~lands, progress(share), 0.0)
     stance, other = either(lands, landed, memory.stance), either(lands, memory.stance, memory.other)
     apart = other[2] - stance[2] + going * (stance[2] + first[2] - other[2])

@@ -143,13 +143,13 @@ def raised(u: Scalar, ramp: float = 0.35) -> Scalar:
 class Gains:
     """How strongly a stabiliser answers; its own figures, none of the robot's.
 
-    pull: share of the DCM's error that the pendulum takes over in a cycle, ahead and aside; rate_filter: of
-    the error's rate, share of the newest; lean: share of the trunk's lean by which the swing foot turns;
-    lean_filter: share of the newest; level_time: time constant of the slope's estimate [s]; sole: share of
-    the sole, less margin [m], in which the ZMP may go; step: share of what is left that the foot's place
-    takes, up to reach ahead and aside [m], by at most 12 mm a cycle; timing: share of it that the step's
-    time takes, within sooner to later of the planned time, by at most 20 ms a cycle; largest: error of the
-    DCM beyond which it counts no more [m].
+    pull: share of the DCM's error beyond dead [m] that the pendulum takes over in a cycle, ahead and aside;
+    rate_filter: of the error's rate, share of the newest; lean: share of the trunk's lean by which the
+    swing foot turns; lean_filter: share of the newest; level_time: time constant of what lasts, the floor's
+    slope and the CoM's gap [s], which is left alone; sole: share of the sole, less margin [m], in which the
+    ZMP may go; step: share of what is left that the foot's place takes, up to reach ahead and aside [m], by
+    at most 12 mm a cycle; timing: share of it that the step's time takes, within sooner to later of the
+    planned time, by at most 20 ms a cycle; largest: error of the DCM beyond which it counts no more [m].
     """
 
     pull: Pair = (0.12, 0.12)
@@ -157,6 +157,7 @@ class Gains:
     lean: Scalar = 0.6
     lean_filter: Scalar = 0.5
     level_time: Scalar = 1.0
+    dead: Scalar = 0.012
     sole: Scalar = 0.6
     margin: Scalar = 0.006
     step: Scalar = 1.0
@@ -312,7 +313,7 @@ def landing(
         clipped(free[0], nominal[0] - rx, nominal[0] + rx),
         -side * clipped(-side * free[1], close, wide + ry),
     )
-    share = (tau - 0.5 * rhythm.both) / larger(period - rhythm.both, 1e-3)
+    share = (tau - rhythm.both) / larger(period - rhythm.both, 1e-3)
     moved = plus(course.place, within(minus(bounded, course.place), (-QUICK, -QUICK), (QUICK, QUICK)))
     still = share >= LATE
     chosen = where(still, course.place[0], moved[0]), where(still, course.place[1], moved[1])

@@ -16,6 +16,7 @@ from screwkin.gait.stabilised import Felt, StabilisedWalk
 from screwkin.model.robot import Robot
 from screwkin.sim.backend import Observation
 from screwkin.sim.perturbation import Perturbation
+from screwkin.trajectory import Trajectory
 
 NOTHING = 1e-6
 """Force on a foot below which nothing presses on it [N]."""
@@ -40,23 +41,32 @@ class Controller(Protocol):
 
 
 class WalkController:
-    """A stabilised walk as a controller; without feedback it walks the same, open loop."""
+    """A stabilised walk as a controller; without feedback it walks the same, open loop.
+
+    What commands of the plan allow for its servos is allowed for here too, at the phase in which the walk is.
+    """
 
     period = CYCLE
 
-    def __init__(self, walk: StabilisedWalk, feedback: bool = True) -> None:
+    def __init__(
+        self, walk: StabilisedWalk, feedback: bool = True, commands: Trajectory | None = None
+    ) -> None:
+        self._allowed = np.zeros_like(walk.q) if commands is None else walk.allowance(commands)
         self.walk, self.feedback, self.course = walk, feedback, walk.start
         self.settings: Mapping[str, Any] = asdict(walk.gains) | ({} if feedback else {"open_loop": True})
 
     def reset(self) -> Array:
         """From the start of the walk."""
         self.course = self.walk.start
-        return self.course.q
+        return self._command()
 
     def answer(self, felt: Felt) -> Array:
         """The next cycle's command."""
         self.course = self.walk.advanced(self.course, felt, self.feedback)
-        return self.course.q
+        return self._command()
+
+    def _command(self) -> Array:
+        return self.course.q + self._allowed[self.walk.phase(self.course)]
 
 
 class Senses:
