@@ -23,8 +23,10 @@ from screwkin.gait.settings import items_of
 
 MOST_ROWS = 1_000_000
 """Rows of a campaign; a slip in a range would plan more."""
-CONDITIONS = ("gait", "engine", "servo", "perturb")
+CONDITIONS = ("gait", "engine", "servo", "feedback", "perturb")
 """Keys of a setting that are no parameters of its gait."""
+OFF, ON = "off", "on"
+"""Values of the condition ``feedback``."""
 
 Axes = Mapping[str, tuple[str, ...]]
 

@@ -9,7 +9,7 @@ from typing import cast
 
 import numpy as np
 
-from screwkin.analysis.campaign import CONDITIONS, Campaign, Row
+from screwkin.analysis.campaign import CONDITIONS, ON, Campaign, Row
 from screwkin.analysis.campaign_outcome import Outcome, crashed
 from screwkin.analysis.campaign_world import world_of
 from screwkin.analysis.engines import Engine, confirms
@@ -28,9 +28,16 @@ def played(campaign: Campaign, row: Row) -> Outcome:
     """Play a row; whatever goes wrong in it is its outcome."""
     try:
         robot, trajectory = _robot(campaign.robot), planned(campaign, row.values)
-        engine, servo = cast(Engine, row.values["engine"]), row.values["servo"]
         world = _world(row, robot, trajectory)
-        return _outcome(row, validate(robot, trajectory, engine, servo=servo, perturbation=world), world)
+        check = validate(
+            robot,
+            trajectory,
+            cast(Engine, row.values["engine"]),
+            servo=row.values["servo"],
+            perturbation=world,
+            feedback=row.values["feedback"] == ON,
+        )
+        return _outcome(row, check, world)
     except NoSolutionError as error:
         return Outcome(row.index, "refused", reason=str(error))
     except Exception as error:

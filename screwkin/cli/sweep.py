@@ -11,7 +11,16 @@ from typing import Annotated, Any
 
 import typer
 
-from screwkin.analysis.campaign import Axes, Campaign, axis_values, check_size, load_seeds, seeds_from
+from screwkin.analysis.campaign import (
+    OFF,
+    ON,
+    Axes,
+    Campaign,
+    axis_values,
+    check_size,
+    load_seeds,
+    seeds_from,
+)
 from screwkin.analysis.campaign_optimum import Search
 from screwkin.analysis.campaign_outcome import Outcome
 from screwkin.analysis.campaign_row import gait_of, played
@@ -27,7 +36,7 @@ from screwkin.cli.output import aligned, drawn, print_json, progress_bar, remark
 from screwkin.cli.simulation import engine as engine_named
 from screwkin.cli.sweep_optimise import bounds_of, optimise
 from screwkin.cli.walk import limbed
-from screwkin.errors import InputError
+from screwkin.errors import InputError, one_of
 from screwkin.files import atomic_write, atomic_write_bytes, npz_bytes, versions
 from screwkin.gait.files import default_gait, load_gait
 from screwkin.gait.fitting import fitting_gait
@@ -57,8 +66,8 @@ def sweep(
         typer.Option(
             "--set",
             metavar="KEY=VALUES",
-            help="A parameter of the gait, or gait, engine, servo, perturb: FROM:TO:STEP, a list A,B, or one "
-            "value; may be repeated, for a grid.",
+            help="A parameter of the gait, or gait, engine, servo, feedback, perturb: FROM:TO:STEP, a list "
+            "A,B, or one value; may be repeated, for a grid.",
         ),
     ] = None,
     runs: Annotated[int | None, typer.Option(help="Runs of every setting; default: 1.")] = None,
@@ -79,6 +88,9 @@ def sweep(
     ] = None,
     engine: Annotated[str | None, typer.Option(help="As of validate; default: auto.")] = None,
     servo: Annotated[str, typer.Option(help="As of validate: rigid, table, or a servo model.")] = RIGID,
+    feedback: Annotated[
+        bool, typer.Option("--feedback", help="As of validate; --set feedback=off,on compares both.")
+    ] = False,
     jobs: Annotated[int | None, typer.Option(help="Processes on this computer; default: 1.")] = None,
     cluster: Annotated[
         str | None,
@@ -109,6 +121,7 @@ def sweep(
         table = limbed(table)
     _refuse_together({"--auto": auto, "--gait": gait, "--set gait": _sets(assignments or [], "gait")})
     _refuse_together({"--perturb": perturb, "--set perturb": _sets(assignments or [], "perturb")})
+    _refuse_together({"--feedback": feedback, "--set feedback": _sets(assignments or [], "feedback")})
     _refuse_together({"--seeds": seeds, "--runs": runs})
     _refuse_together({"--seeds": seeds, "--seed": seed})
     _refuse_together({"--jobs": jobs, "--cluster": cluster})
@@ -119,6 +132,7 @@ def sweep(
             "gait": AUTO if auto else gait or default_gait(table.name),
             "engine": engine or ("kinematic" if objective == "margin" else "auto"),
             "servo": servo,
+            "feedback": ON if feedback else OFF,
             "perturb": " ".join(perturb) if perturb else AS_PLANNED,
         },
     )
@@ -186,6 +200,8 @@ def _campaign(robot: Robot, axes: Axes, seeds: tuple[int, ...]) -> Campaign:
         engine_named(name)
     for name in axes["servo"]:
         SimulatedCompliance().on(name).motors_of(robot)
+    for text in axes["feedback"]:
+        one_of("feedback", text, (OFF, ON))
     for text in axes["perturb"]:
         check_world(text, robot)
         if text != AS_PLANNED and "kinematic" in axes["engine"]:

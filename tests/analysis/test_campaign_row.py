@@ -24,7 +24,8 @@ GAIT = sk.load_gait("walk").replace(steps=1, rate=20)
 
 
 def campaign(**axes: tuple[str, ...]) -> Campaign:
-    conditions = {"gait": ("mine",), "engine": ("kinematic",), "servo": ("rigid",), "perturb": ("none",)}
+    conditions = {"gait": ("mine",), "engine": ("kinematic",), "servo": ("rigid",)}
+    conditions |= {"feedback": ("off",), "perturb": ("none",)}
     return Campaign(robot_text(ROBOT), {"mine": json.dumps(GAIT.to_dict())}, conditions | axes, (3, 4), {})
 
 
