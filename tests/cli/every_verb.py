@@ -13,6 +13,7 @@ import os
 import sys
 import tempfile
 from collections.abc import Collection, Iterator, Mapping
+from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -98,7 +99,7 @@ NEEDS = {
     "view": ["viser"],
     "demo": ["mujoco"],
 }
-ENGINES = {"mujoco", "pybullet"}
+ENGINES = ("mujoco", "pybullet")
 VERDICT = {"send", "send --virtual"}
 """What is refused, with exit code 4, where there is no verdict."""
 DRAWING = {"compare", "sweep", "walk", "validate kinematic", "workspace", "stiffness", "reproduce"}
@@ -128,13 +129,21 @@ def expected(name: str, absent: Collection[str]) -> tuple[int, str]:
     """Exit code of a verb without some libraries, and the package that it asks for."""
     if name in VERDICT and expected("validate", absent)[1]:
         return 4, ""
-    if name == "doctor" and {*absent} >= ENGINES:
+    if name == "doctor" and not any(_installed(engine) for engine in ENGINES):
         return 3, ""
     for library in NEEDS.get(name, []):
         if library in absent:
             return 2, PACKAGES[library]
     picture = name in DRAWING and "matplotlib" in absent
     return AS_EVER.get(name, 0), "matplotlib" if picture else ""
+
+
+def _installed(package: str) -> bool:
+    """Whether a distribution is there, whatever imports are kept from finding it."""
+    try:
+        return bool(version(package))
+    except PackageNotFoundError:
+        return False
 
 
 def called(verbs: Mapping[str, str]) -> Iterator[tuple[str, int, str]]:
