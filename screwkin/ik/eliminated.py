@@ -22,7 +22,7 @@ from screwkin.compiler.run import run
 from screwkin.ik.closed import EXACT
 from screwkin.ik.elimination import ANGLES, Elimination, dialytic, eliminations, vanishing
 from screwkin.ik.polish import polished
-from screwkin.ik.rank import clipped, key_of, kind_of, sines, worst_excess, wrapped_angles
+from screwkin.ik.rank import key_of, kind_of, sines, within_limits, worst_excess, wrapped_angles
 from screwkin.ik.starts import box, spread
 from screwkin.kinematics.serial_chain import SerialChain, forward, per_chain
 
@@ -249,7 +249,7 @@ def branch(chain: SerialChain) -> Program:
     recorder.output("q", q)
     recorder.output("error", [error])
     recorder.output("worst", [worst])
-    recorder.output("key", [key_of(angles, sines(clipped(chain, guess)), kind)])
+    recorder.output("key", [key_of(angles, sines(within_limits(chain, guess)), kind)])
     return recorder.program()
 
 

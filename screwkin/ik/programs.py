@@ -17,7 +17,16 @@ from screwkin.compiler.program import Program, Recorder
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.ik.all_branches import branch_programs, has_branches
 from screwkin.ik.closed import EXACT, recognised
-from screwkin.ik.rank import INSIDE, Pairs, clipped, key_of, kind_of, sines, worst_excess, wrapped_angles
+from screwkin.ik.rank import (
+    INSIDE,
+    Pairs,
+    key_of,
+    kind_of,
+    sines,
+    within_limits,
+    worst_excess,
+    wrapped_angles,
+)
 from screwkin.kinematics.arrays import Argument
 from screwkin.kinematics.door import Door
 from screwkin.kinematics.limits import CUT, TURN, turn_within
@@ -52,7 +61,7 @@ def limb_branches(chain: SerialChain, position: bool) -> Door:
     )
     arguments = _arguments(chain, "T_base_tip", position)
     target = _target(recorder, arguments[0])
-    near = sines(clipped(chain, recorder.input("guess", len(chain.names))))
+    near = sines(within_limits(chain, recorder.input("guess", len(chain.names))))
     rows, certified = [], 1.0
     for *angles, slack in form.formula(target):
         q = wrapped_angles(chain, angles)
@@ -168,7 +177,7 @@ def _nearest(
     """
     form = recognised(chain, isinstance(target, Vector))
     assert form is not None
-    held = clipped(chain, guess)
+    held = within_limits(chain, guess)
     near = sines(held)
     none, least_key = -4.0 * INSIDE, -3.0 * INSIDE
     best: list[Scalar] = [none, *(x for pair in near for x in pair)]

@@ -16,7 +16,7 @@ INSIDE = 100.0
 Pairs = list[tuple[Scalar, Scalar]]
 
 
-def clipped(chain: SerialChain, guess: Sequence[Scalar]) -> list[Scalar]:
+def within_limits(chain: SerialChain, guess: Sequence[Scalar]) -> list[Scalar]:
     """A guess, inside the limits: as such it counts."""
     ends = zip(guess, chain.lower.tolist(), chain.upper.tolist(), strict=True)
     held = []
