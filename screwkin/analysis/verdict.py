@@ -24,7 +24,8 @@ from screwkin.trajectory import Trajectory
 _FLOORS = ("settle", "hold", "fallen_height")
 """Criteria that are stricter the greater they are; all others are bounds from above."""
 _SIGNED = ("min_margin_mm", "end_turn_deg", "fell_at")
-_TRACED = ("screwkin", "numpy", "scipy", "pybullet", "mujoco")
+VERSIONED = ("screwkin", "numpy", "scipy", "pybullet", "mujoco")
+"""What computes a verdict, or the rows of a campaign."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +133,7 @@ def verdict_of(robot: Robot, trajectory: Trajectory, check: Measured) -> Verdict
     return Verdict(
         **{f.name: getattr(check, f.name) for f in fields(Measured)},
         **bound_to(robot, trajectory, check.servo),
-        versions={name: text for name, text in versions(*_TRACED).items() if text != "unknown"},
+        versions={name: text for name, text in versions(*VERSIONED).items() if text != "unknown"},
     )
 
 

@@ -20,6 +20,13 @@ RobotName = Annotated[
     ),
 ]
 TrajectoryPath = Annotated[Path, typer.Argument(metavar="TRAJ", help="A trajectory.npz, as walk writes it.")]
+GaitName = Annotated[
+    str | None,
+    typer.Option(metavar="NAME|FILE", help="A bundled gait's name or a file; default: ROBOT-… or walk."),
+]
+FittingGait = Annotated[
+    bool, typer.Option("--auto", help="A gait that fits the robot; limbs are found where none are named.")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON object on stdout.")]
 OutputFolder = Annotated[
     Path | None,

@@ -30,8 +30,9 @@ from screwkin.analysis.campaign_statistics import Paired, Tally, comparisons, ta
 from screwkin.analysis.campaign_store import Journal, journal
 from screwkin.analysis.campaign_world import AS_PLANNED, check_world
 from screwkin.analysis.engines import RIGID, SimulatedCompliance
+from screwkin.analysis.verdict import VERSIONED
 from screwkin.cli.folder import output_folder
-from screwkin.cli.options import AsJson, OutputFolder, RobotName, settings
+from screwkin.cli.options import AsJson, FittingGait, GaitName, OutputFolder, RobotName, settings
 from screwkin.cli.output import aligned, drawn, print_json, progress_bar, remark
 from screwkin.cli.simulation import engine as engine_named
 from screwkin.cli.sweep_optimise import bounds_of, optimise
@@ -44,8 +45,6 @@ from screwkin.gait.record import Gait
 from screwkin.model.robot import Robot, robot_text
 from screwkin.model.table import load_robot
 
-TRACED = ("screwkin", "numpy", "scipy", "pybullet", "mujoco")
-"""What computes the rows; rows of other versions are not mixed with them."""
 AUTO = "--auto"
 """The gait that fits the robot, as the axis ``gait`` names it."""
 SHOWN = 40
@@ -54,13 +53,8 @@ SHOWN = 40
 
 def sweep(
     robot: RobotName,
-    gait: Annotated[
-        str | None,
-        typer.Option(metavar="NAME|FILE", help="A bundled gait's name or a file; default: ROBOT-… or walk."),
-    ] = None,
-    auto: Annotated[
-        bool, typer.Option("--auto", help="A gait that fits the robot; limbs are found where none are named.")
-    ] = False,
+    gait: GaitName = None,
+    auto: FittingGait = False,
     assignments: Annotated[
         list[str] | None,
         typer.Option(
@@ -209,7 +203,7 @@ def _campaign(robot: Robot, axes: Axes, seeds: tuple[int, ...]) -> Campaign:
                 f"--perturb {text}: engine kinematic has no forces to perturb; use mujoco or pybullet"
             )
     gaits = {name: json.dumps(_gait(robot, name).to_dict()) for name in axes["gait"]}
-    campaign = Campaign(robot_text(robot), gaits, axes, seeds, versions(*TRACED))
+    campaign = Campaign(robot_text(robot), gaits, axes, seeds, versions(*VERSIONED))
     for values in campaign.settings:
         gait_of(campaign, values)
     return campaign

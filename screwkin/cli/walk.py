@@ -13,7 +13,7 @@ from screwkin.analysis.account import Account, account_of
 from screwkin.anatomy.humanoid import anatomy
 from screwkin.cli.compensated import CompensateBy, Passes, ServoStiffness, compensated, remedy
 from screwkin.cli.folder import output_folder
-from screwkin.cli.options import AsJson, OutputFolder, RobotName, numbers_of, settings
+from screwkin.cli.options import AsJson, FittingGait, GaitName, OutputFolder, RobotName, numbers_of, settings
 from screwkin.cli.output import aligned, drawn, print_json, progress_bar, remark
 from screwkin.errors import InputError
 from screwkin.files import atomic_write
@@ -32,13 +32,8 @@ from screwkin.report.numbers import walk_data, walk_numbers
 
 def walk(
     robot: RobotName,
-    gait: Annotated[
-        str | None,
-        typer.Option(metavar="NAME|FILE", help="A bundled gait's name or a file; default: ROBOT-… or walk."),
-    ] = None,
-    auto: Annotated[
-        bool, typer.Option("--auto", help="A gait that fits the robot; limbs are found where none are named.")
-    ] = False,
+    gait: GaitName = None,
+    auto: FittingGait = False,
     steps: Annotated[int | None, typer.Option(help="Number of steps; default: the gait's.")] = None,
     list_of_steps: Annotated[
         Path | None,
