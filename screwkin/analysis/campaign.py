@@ -32,7 +32,7 @@ Axes = Mapping[str, tuple[str, ...]]
 
 
 @dataclass(frozen=True)
-class Row:
+class CampaignRow:
     """One walk to simulate: its number, setting, run and seed.
 
     values: texts by key, as ``--set`` takes them. Row number = setting * runs + run; a run has the same seed
@@ -67,10 +67,10 @@ class Campaign:
         return tuple(dict(zip(self.axes, values, strict=True)) for values in product(*self.axes.values()))
 
     @property
-    def rows(self) -> tuple[Row, ...]:
+    def rows(self) -> tuple[CampaignRow, ...]:
         """All rows, in their order."""
         return tuple(
-            Row(setting * len(self.seeds) + run, setting, run, seed, values)
+            CampaignRow(setting * len(self.seeds) + run, setting, run, seed, values)
             for setting, values in enumerate(self.settings)
             for run, seed in enumerate(self.seeds)
         )
@@ -87,7 +87,7 @@ class Campaign:
         return data | {"robot": text_sha256(self.robot), "gaits": gaits}
 
 
-def check_size(axes: Axes, runs: int) -> None:
+def check_rows(axes: Axes, runs: int) -> None:
     """Refuse campaigns that never end.
 
     Raises:
@@ -183,6 +183,6 @@ def _range(key: str, text: str) -> tuple[str, ...]:
     return tuple(format((first + k * step).normalize(), "f") for k in range(count))
 
 
-def differences(here: Mapping[str, Any], there: Mapping[str, Any]) -> Sequence[str]:
+def differing_keys(here: Mapping[str, Any], there: Mapping[str, Any]) -> Sequence[str]:
     """Keys in which two plans differ."""
     return [key for key in {**here, **there} if here.get(key) != there.get(key)]

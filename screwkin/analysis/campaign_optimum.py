@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.analysis.campaign import Campaign, Row
+from screwkin.analysis.campaign import Campaign, CampaignRow
 from screwkin.analysis.campaign_outcome import Outcome
 from screwkin.analysis.campaign_statistics import tally
 from screwkin.errors import InputError, NoSolutionError
@@ -25,7 +25,7 @@ MEMBERS = 6
 DIGITS = 6
 """Significant digits of a parameter."""
 
-Batch = Callable[[Sequence[Row]], Mapping[int, Outcome]]
+Batch = Callable[[Sequence[CampaignRow]], Mapping[int, Outcome]]
 """Plays rows, if they have not ended yet, and returns outcomes by number, theirs among them."""
 
 
@@ -143,9 +143,11 @@ def _values(search: Search, x: Array) -> dict[str, str]:
     return {**search.campaign.settings[0], **numbers}
 
 
-def _rows(search: Search, setting: int, values: Mapping[str, str]) -> list[Row]:
+def _rows(search: Search, setting: int, values: Mapping[str, str]) -> list[CampaignRow]:
     seeds = search.campaign.seeds
-    return [Row(setting * len(seeds) + run, setting, run, seed, values) for run, seed in enumerate(seeds)]
+    return [
+        CampaignRow(setting * len(seeds) + run, setting, run, seed, values) for run, seed in enumerate(seeds)
+    ]
 
 
 def _cost(objective: str, outcomes: Sequence[Outcome]) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal
 
-from screwkin.analysis.campaign import Row
+from screwkin.analysis.campaign import CampaignRow
 
 Status = Literal["stood", "fell", "planned", "refused", "crashed"]
 STATUSES: tuple[Status, ...] = ("stood", "fell", "planned", "refused", "crashed")
@@ -58,6 +58,6 @@ def outcome_from_dict(data: Mapping[str, Any]) -> Outcome:
     return outcome
 
 
-def crashed(row: Row, error: BaseException) -> Outcome:
+def crashed(row: CampaignRow, error: BaseException) -> Outcome:
     """The outcome of a row in which the program failed."""
     return Outcome(row.index, "crashed", reason=f"{type(error).__name__}: {error}".rstrip(": "))

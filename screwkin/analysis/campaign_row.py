@@ -9,7 +9,7 @@ from typing import cast
 
 import numpy as np
 
-from screwkin.analysis.campaign import CONDITIONS, ON, Campaign, Row
+from screwkin.analysis.campaign import CONDITIONS, ON, Campaign, CampaignRow
 from screwkin.analysis.campaign_outcome import Outcome, crashed
 from screwkin.analysis.campaign_world import world_of
 from screwkin.analysis.engines import Engine, confirms
@@ -24,10 +24,10 @@ from screwkin.sim.perturbation_files import described
 from screwkin.trajectory import Trajectory
 
 
-def played(campaign: Campaign, row: Row) -> Outcome:
+def played_row(campaign: Campaign, row: CampaignRow) -> Outcome:
     """Play a row; whatever goes wrong in it is its outcome."""
     try:
-        robot, trajectory = _robot(campaign.robot), planned(campaign, row.values)
+        robot, trajectory = _robot(campaign.robot), walk_of_setting(campaign, row.values)
         world = _world(row, robot, trajectory)
         check = validate(
             robot,
@@ -44,7 +44,7 @@ def played(campaign: Campaign, row: Row) -> Outcome:
         return crashed(row, error)
 
 
-def planned(campaign: Campaign, values: Mapping[str, str]) -> Trajectory:
+def walk_of_setting(campaign: Campaign, values: Mapping[str, str]) -> Trajectory:
     """The walk of a setting; the processes of a campaign remember the last ones.
 
     Raises:
@@ -90,14 +90,14 @@ def _planned(
         return error
 
 
-def _world(row: Row, robot: Robot, trajectory: Trajectory) -> Perturbation:
+def _world(row: CampaignRow, robot: Robot, trajectory: Trajectory) -> Perturbation:
     way = trajectory.T_world_base[:, 0, 3]
     return world_of(
         row.values["perturb"], robot, row.seed, trajectory.duration, float(np.abs(way - way[0]).max())
     )
 
 
-def _outcome(row: Row, check: Validation, world: Perturbation) -> Outcome:
+def _outcome(row: CampaignRow, check: Validation, world: Perturbation) -> Outcome:
     return Outcome(
         row=row.index,
         status="planned" if not confirms(check.engine) else "fell" if check.fell else "stood",

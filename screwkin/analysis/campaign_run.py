@@ -13,7 +13,7 @@ from multiprocessing import active_children, get_context, parent_process
 from threading import Thread
 from typing import Any
 
-from screwkin.analysis.campaign import Row
+from screwkin.analysis.campaign import CampaignRow
 from screwkin.analysis.campaign_outcome import Outcome, crashed
 
 ONE_THREAD = {
@@ -26,7 +26,7 @@ ONE_THREAD = {
 _AHEAD = 2
 """Rows handed out for every worker, so that none waits for the next."""
 
-Play = Callable[[Row], Outcome]
+Play = Callable[[CampaignRow], Outcome]
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ def local_workers(jobs: int) -> Workers:
     return Workers(_processes, jobs)
 
 
-def outcomes(play: Play, rows: Iterable[Row], workers: Workers) -> Iterator[Outcome]:
+def outcomes(play: Play, rows: Iterable[CampaignRow], workers: Workers) -> Iterator[Outcome]:
     """The outcomes of rows, each as it ends.
 
     A row whose process dies is an outcome too: of the rows that were being played then, each is played again
@@ -62,7 +62,7 @@ def outcomes(play: Play, rows: Iterable[Row], workers: Workers) -> Iterator[Outc
         rows: to play.
         workers: that play them.
     """
-    waiting, running = deque(rows), dict[Future[Outcome], Row]()
+    waiting, running = deque(rows), dict[Future[Outcome], CampaignRow]()
     while waiting:
         try:
             with workers.opened(workers.width) as pool:
@@ -75,7 +75,11 @@ def outcomes(play: Play, rows: Iterable[Row], workers: Workers) -> Iterator[Outc
 
 
 def _until_broken(
-    play: Play, waiting: deque[Row], running: dict[Future[Outcome], Row], pool: Executor, workers: Workers
+    play: Play,
+    waiting: deque[CampaignRow],
+    running: dict[Future[Outcome], CampaignRow],
+    pool: Executor,
+    workers: Workers,
 ) -> Iterator[Outcome]:
     """Outcomes until all rows are done; if the pool breaks, ``running`` holds those that it left then."""
     while waiting or running:
@@ -89,7 +93,7 @@ def _until_broken(
 
 
 @contextmanager
-def standing(workers: Workers) -> Iterator[Workers]:
+def standing_workers(workers: Workers) -> Iterator[Workers]:
     """The same workers for several calls of ``outcomes``: they start once, and anew after one has died."""
     pools: list[Executor] = []
     with ExitStack() as stack:
@@ -111,7 +115,7 @@ def standing(workers: Workers) -> Iterator[Workers]:
         yield replace(workers, opened=opened)
 
 
-def _alone(play: Play, row: Row, workers: Workers) -> Outcome:
+def _alone(play: Play, row: CampaignRow, workers: Workers) -> Outcome:
     """The outcome of a row in a process of its own."""
     try:
         with workers.opened(1) as pool:
@@ -120,7 +124,7 @@ def _alone(play: Play, row: Row, workers: Workers) -> Outcome:
         return crashed(row, error)
 
 
-def _result(future: Future[Outcome], row: Row, workers: Workers) -> Outcome:
+def _result(future: Future[Outcome], row: CampaignRow, workers: Workers) -> Outcome:
     try:
         return future.result()
     except workers.deaths as error:

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.analysis.campaign import Campaign, Row
+from screwkin.analysis.campaign import Campaign, CampaignRow
 from screwkin.analysis.campaign_outcome import MEASURES, STATUSES, Outcome
 from screwkin.analysis.campaign_statistics import Tally
 
-Finished = Sequence[tuple[Row, Outcome]]
+Finished = Sequence[tuple[CampaignRow, Outcome]]
 
 
-def finished(campaign: Campaign, outcomes: Mapping[int, Outcome]) -> Finished:
+def finished_rows(campaign: Campaign, outcomes: Mapping[int, Outcome]) -> Finished:
     """Rows that ended, with their outcomes, in the order of the plan."""
     return [(row, outcomes[row.index]) for row in campaign.rows if row.index in outcomes]
 

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO, Self
 
-from screwkin.analysis.campaign import differences
+from screwkin.analysis.campaign import differing_keys
 from screwkin.analysis.campaign_outcome import Outcome, outcome_from_dict
 from screwkin.errors import InputError, OutputError
 from screwkin.files import atomic_write, read_file, read_json
@@ -79,7 +79,7 @@ def _check_plan(path: Path, plan: Mapping[str, Any]) -> None:
             file.write(json.dumps(dict(plan), indent=2) + "\n")
         return
     there = read_json(read_file(path).decode(errors="replace"))
-    differing = differences(plan, there) if isinstance(there, dict) else ["all"]
+    differing = differing_keys(plan, there) if isinstance(there, dict) else ["all"]
     if differing:
         raise InputError(
             f"{path} is of another campaign: {', '.join(differing)} differ; repeat the command that "

@@ -15,7 +15,7 @@ from typing import Any
 from screwkin.errors import InputError, near
 from screwkin.model.expression import ExpressionError, evaluate
 from screwkin.model.robot import Robot
-from screwkin.sim.drawn import NOWHERE, Spread, drawn
+from screwkin.sim.drawn import NOWHERE, Spread, drawn_world
 from screwkin.sim.perturbation import BY_NAME, DEFAULTS, NONE, Perturbation, by_name
 from screwkin.sim.perturbation_files import perturbation_from_texts
 
@@ -41,7 +41,9 @@ def world_of(text: str, robot: Robot, seed: int, duration: float, distance: floa
         return NONE
     words = text.split()
     fixed = [word for word in words if "=" in word]
-    world = drawn(robot, seed, spread_of([word for word in words if "=" not in word]), duration, distance)
+    world = drawn_world(
+        robot, seed, spread_of([word for word in words if "=" not in word]), duration, distance
+    )
     own = perturbation_from_texts(fixed)
     return replace(world, **{key: getattr(own, key) for key in own.to_dict()})
 

@@ -21,7 +21,7 @@ from screwkin.kinematics.serial_chain import SerialChain, distance
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class MethodOutcome:
     """What a method did with B samples: q (B, n), solved (B,) bool, iterations (B,), wall time [s]."""
 
     q: Array
@@ -49,7 +49,7 @@ def pinocchio_model(pin: Any, chain: SerialChain) -> Any:
     return model
 
 
-def pinocchio_clik(chain: SerialChain, target: Array, settings: IkSettings) -> Outcome | None:
+def pinocchio_clik(chain: SerialChain, target: Array, settings: IkSettings) -> MethodOutcome | None:
     """Closed-loop inverse kinematics as Pinocchio's documentation shows it: damping 1e-12, step 0.1."""
     pin = _library("pinocchio")
     if pin is None or not chain.turning.all():
@@ -82,7 +82,7 @@ def pinocchio_clik(chain: SerialChain, target: Array, settings: IkSettings) -> O
             x = x - 0.1 * J.T @ np.linalg.solve(J @ J.T + 1e-12 * np.eye(6), residual)
             iterations[k] += 1
         q[k] = x
-    return Outcome(q, solved, iterations, time.perf_counter() - begin)
+    return MethodOutcome(q, solved, iterations, time.perf_counter() - begin)
 
 
 def offset_parameters(chain: SerialChain) -> tuple[Array, Array]:
@@ -92,7 +92,7 @@ def offset_parameters(chain: SerialChain) -> tuple[Array, Array]:
     return axes, np.diff(np.array(points, dtype=float), axis=0)
 
 
-def eaik(chain: SerialChain, target: Array, settings: IkSettings) -> Outcome | None:
+def eaik(chain: SerialChain, target: Array, settings: IkSettings) -> MethodOutcome | None:
     """EAIK: subproblem decomposition chosen by the limb's geometry; its nearest branch to q = 0."""
     library = _library("eaik.IK_HP")
     if library is None or not chain.turning.all():
@@ -113,10 +113,10 @@ def eaik(chain: SerialChain, target: Array, settings: IkSettings) -> Outcome | N
             q[k], solved[k] = min(branches, key=lambda x: float(np.abs(np.sin(x / 2)).max())), True
     seconds = time.perf_counter() - begin
     solved &= distance(chain, q, target) <= np.sqrt(EXACT)
-    return Outcome(q, solved, np.ones(len(target), dtype=int), seconds)
+    return MethodOutcome(q, solved, np.ones(len(target), dtype=int), seconds)
 
 
-OTHERS: tuple[tuple[str, str, Callable[[SerialChain, Array, IkSettings], Outcome | None]], ...] = (
+OTHERS: tuple[tuple[str, str, Callable[[SerialChain, Array, IkSettings], MethodOutcome | None]], ...] = (
     ("pinocchio-clik", "from q = 0; damping 1e-12, step 0.1", pinocchio_clik),
     ("eaik", "all branches; solved to 1e-6", eaik),
 )

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.analysis.ik_others import OTHERS, Outcome
+from screwkin.analysis.ik_others import OTHERS, MethodOutcome
 from screwkin.analysis.ik_targets import path_notes, random_targets, walking_path, walking_targets
 from screwkin.errors import InputError
 from screwkin.ik.closed import closed_form
@@ -162,11 +162,11 @@ def measured_row(chain: SerialChain, data: str, target: Array, entry: Entry) -> 
     begin = time.perf_counter()
     solution = solve_limb(chain, target, entry.method, start, entry.settings, (count,), nearest=False)
     seconds = time.perf_counter() - begin
-    outcome = Outcome(solution.best, solution.valid[:, 0], solution.iterations[:, 0], seconds)
+    outcome = MethodOutcome(solution.best, solution.valid[:, 0], solution.iterations[:, 0], seconds)
     return _row(chain, data, entry.name, entry.start, outcome, entry.settings.max_iterations)
 
 
-def _row(chain: SerialChain, data: str, name: str, start: str, outcome: Outcome, cap: int) -> IkRow:
+def _row(chain: SerialChain, data: str, name: str, start: str, outcome: MethodOutcome, cap: int) -> IkRow:
     iterations = np.where(outcome.solved, outcome.iterations, cap)
     inside = outcome.solved & chain.within(chain.wrapped(outcome.q))
     return IkRow(

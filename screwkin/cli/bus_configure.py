@@ -23,7 +23,7 @@ from screwkin.servo.configure import (
     SavedServo,
     backup_data,
     load_backup,
-    planned,
+    planned_changes,
     refuse_torque,
     reversed_changes,
     saved,
@@ -92,7 +92,7 @@ def _configured(
     refuse_torque(bus, bounds)  # those too that answer only now
     done: list[Change] = []
     for k, servo in before.items():
-        changes = planned(bounds, k, servo)
+        changes = planned_changes(bounds, k, servo)
         _write(bus, bounds, k, changes, f"What they held before is in {file}")
         done += changes
     return done, file

@@ -17,15 +17,15 @@ from screwkin.analysis.campaign import (
     Axes,
     Campaign,
     axis_values,
-    check_size,
+    check_rows,
     load_seeds,
     seeds_from,
 )
 from screwkin.analysis.campaign_optimum import Search
 from screwkin.analysis.campaign_outcome import Outcome
-from screwkin.analysis.campaign_row import gait_of, played
+from screwkin.analysis.campaign_row import gait_of, played_row
 from screwkin.analysis.campaign_run import Workers, local_workers, outcomes
-from screwkin.analysis.campaign_sheet import finished, rows_arrays, rows_csv, settings_csv
+from screwkin.analysis.campaign_sheet import finished_rows, rows_arrays, rows_csv, settings_csv
 from screwkin.analysis.campaign_statistics import Paired, Tally, comparisons, tallies, tally
 from screwkin.analysis.campaign_store import Journal, journal
 from screwkin.analysis.campaign_world import AS_PLANNED, check_world
@@ -189,7 +189,7 @@ def _campaign(robot: Robot, axes: Axes, seeds: tuple[int, ...]) -> Campaign:
     Raises:
         UnknownNameError, GaitError, InputError: a gait, engine, servo, key or value is wrong.
     """
-    check_size(axes, len(seeds))
+    check_rows(axes, len(seeds))
     for name in axes["engine"]:
         engine_named(name)
     for name in axes["servo"]:
@@ -232,13 +232,13 @@ def _play(campaign: Campaign, rows: Journal, workers: Workers) -> None:
             f"{len(rows.outcomes):,} of {len(campaign.rows):,} rows have ended before; {len(left):,} are left"
         )
     with progress_bar("campaign") as done:
-        for k, outcome in enumerate(outcomes(partial(played, campaign), left, workers), 1):
+        for k, outcome in enumerate(outcomes(partial(played_row, campaign), left, workers), 1):
             rows.append(outcome)
             done(k / len(left))
 
 
 def _write(campaign: Campaign, done: Mapping[int, Outcome], folder: Path) -> None:
-    rows = finished(campaign, done)
+    rows = finished_rows(campaign, done)
     for name, text in (
         ("rows.csv", rows_csv(campaign, rows)),
         ("settings.csv", settings_csv(campaign, tallies(campaign, done))),

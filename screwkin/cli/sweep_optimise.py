@@ -7,11 +7,11 @@ from contextlib import AbstractContextManager
 from functools import partial
 from pathlib import Path
 
-from screwkin.analysis.campaign import Row
+from screwkin.analysis.campaign import CampaignRow
 from screwkin.analysis.campaign_optimum import Optimum, Search, check_search, optimum
 from screwkin.analysis.campaign_outcome import Outcome
-from screwkin.analysis.campaign_row import gait_of, played
-from screwkin.analysis.campaign_run import Workers, outcomes, standing
+from screwkin.analysis.campaign_row import gait_of, played_row
+from screwkin.analysis.campaign_run import Workers, outcomes, standing_workers
 from screwkin.analysis.campaign_statistics import tally
 from screwkin.analysis.campaign_store import journal
 from screwkin.cli.folder import output_folder
@@ -67,12 +67,12 @@ def optimise(
             campaign, campaign.settings[0] | {key: f"{ends[end]:g}" for key, ends in search.bounds.items()}
         )
     with output_folder(output, "sweep", robot) as folder:
-        with journal(folder, search.to_dict()) as rows, workers as some, standing(some) as ready:
+        with journal(folder, search.to_dict()) as rows, workers as some, standing_workers(some) as ready:
             with progress_bar("search") as done:
 
-                def play(batch: Sequence[Row]) -> Mapping[int, Outcome]:
+                def play(batch: Sequence[CampaignRow]) -> Mapping[int, Outcome]:
                     left = [row for row in batch if row.index not in rows.outcomes]
-                    for outcome in outcomes(partial(played, campaign), left, ready):
+                    for outcome in outcomes(partial(played_row, campaign), left, ready):
                         rows.append(outcome)
                         done(min(1.0, len(rows.outcomes) / (search.evaluations * len(campaign.seeds))))
                     return rows.outcomes

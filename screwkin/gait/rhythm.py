@@ -11,7 +11,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, pose_from_array
 from screwkin.errors import InputError
 from screwkin.gait.ground import ground_of
-from screwkin.gait.stabiliser import STARTING, Body, Memory
+from screwkin.gait.stabiliser import STARTING, Memory, WalkingBody
 from screwkin.gait.stabiliser_law import Rhythm
 from screwkin.kinematics.body import center_of_mass
 from screwkin.kinematics.mass import GRAVITY
@@ -120,7 +120,7 @@ def steps_of(plan: Trajectory, tips: tuple[str, str], rhythm: Rhythm, swings: li
     return np.array(rows)
 
 
-def share_of(plan: Trajectory, body: Body) -> float:
+def share_of(plan: Trajectory, body: WalkingBody) -> float:
     """How far the CoM moves with the waist while the feet stay, in the middle of a plan."""
     k = len(plan.time) // 2
     near, waist = plan.q[k].tolist(), plan.T_world_base[k] @ np.linalg.inv(as_array(body.T_waist_base))
@@ -134,7 +134,7 @@ def share_of(plan: Trajectory, body: Body) -> float:
     return float(com[1] - com[0]) / (2.0 * _SHIFT)
 
 
-def start_of(plan: Trajectory, body: Body, rhythm: Rhythm, swings: list[Swing]) -> Memory:
+def start_of(plan: Trajectory, body: WalkingBody, rhythm: Rhythm, swings: list[Swing]) -> Memory:
     """The memory of a stabiliser at the first sample of a plan, at rest."""
     swing = swings[0].foot
     stance, other = (_place(plan, body.tips[i], 0).tolist() for i in (1 - swing, swing))

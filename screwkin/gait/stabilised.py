@@ -22,14 +22,14 @@ from screwkin.gait.stabiliser import (
     STEPPING,
     STOPPING,
     Ahead,
-    Body,
     Memory,
-    Senses,
-    Walker,
+    Sensed,
+    StabilisedBody,
+    WalkingBody,
     body_of,
     cycle,
 )
-from screwkin.gait.stabiliser_law import Gains, Rhythm, of_row, row, size_of
+from screwkin.gait.stabiliser_law import Gains, Rhythm, of_row, row, scalars_in
 from screwkin.gait.stance import stance_of
 from screwkin.kinematics.body import center_of_mass, frame_pose
 from screwkin.model.robot import Robot
@@ -55,7 +55,7 @@ class Felt:
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class StabilisedState:
     """Where a stabilised walk is.
 
     memory (k,): see ``stabiliser.Memory``; q (n,): commanded joint positions; landed: steps that have; time
@@ -76,26 +76,28 @@ class StabilisedWalk:
     (K, n): planned joint positions, and heights (K,) of the waist [m]; start: the course at the beginning.
     """
 
-    body: Body
+    body: WalkingBody
     rhythm: Rhythm
     gains: Gains
     steps: Array
     q: Array
     heights: Array
-    start: Course
+    start: StabilisedState
 
     @cached_property
     def program(self) -> Program:
         """Of a cycle, for the robot's every walk."""
         return stabiliser_program(self.body.robot, *self.body.tips)
 
-    def advanced(self, course: Course, felt: Felt, feedback: bool = True) -> Course:
+    def advanced(self, course: StabilisedState, felt: Felt, feedback: bool = True) -> StabilisedState:
         """The course a cycle later, with the command for its end."""
         answer = run(self.program, self.inputs(course, felt, feedback), ())
         landed = course.landed + int(answer["landed"][0])
-        return Course(answer["memory_after"], answer["goal"], landed, course.time + float(self.rhythm.dt))
+        return StabilisedState(
+            answer["memory_after"], answer["goal"], landed, course.time + float(self.rhythm.dt)
+        )
 
-    def inputs(self, course: Course, felt: Felt, feedback: bool = True) -> dict[str, Array]:
+    def inputs(self, course: StabilisedState, felt: Felt, feedback: bool = True) -> dict[str, Array]:
         """What the program takes for a cycle, by name."""
         k = course.landed
         now = min(self.phase(course) + 1, len(self.heights) - 1)
@@ -117,7 +119,7 @@ class StabilisedWalk:
             "feedback": np.array([float(feedback)]),
         }
 
-    def phase(self, course: Course) -> int:
+    def phase(self, course: StabilisedState) -> int:
         """The plan's cycle in which a course is, whose steps may last longer or shorter than planned."""
         mode, tau, period = course.memory[:3].tolist()
         T = float(self.rhythm.period)
@@ -185,7 +187,9 @@ def stabilised(robot: Robot, trajectory: Trajectory, gains: Gains | None = None)
         steps=steps_of(plan, body.tips, rhythm, swings),
         q=plan.sampled(times)[0],
         heights=waist[:, 2, 3],
-        start=Course(np.array(row(start_of(plan, body, rhythm, swings))), np.array(plan.q[0]), 0, 0.0),
+        start=StabilisedState(
+            np.array(row(start_of(plan, body, rhythm, swings))), np.array(plan.q[0]), 0, 0.0
+        ),
     )
 
 
@@ -276,11 +280,11 @@ def stabiliser_program(robot: Robot, right: str, left: str) -> Program:
     )
 
     def record(kind: type[T], name: str) -> T:
-        return of_row(kind, recorder.input(name, size_of(kind)))
+        return of_row(kind, recorder.input(name, scalars_in(kind)))
 
     rhythm, gains, memory = record(Rhythm, "rhythm"), record(Gains, "gains"), record(Memory, "memory")
     (share,) = recorder.input("share", 1)
-    walker = Walker(body_of(robot, right, left, share), rhythm, gains)
+    walker = StabilisedBody(body_of(robot, right, left, share), rhythm, gains)
     a = recorder.input("attitude", 3, 3)
     attitude = Rotation(*(Vector(a[k], a[3 + k], a[6 + k]) for k in range(3)))
     n = len(robot.joints)
@@ -290,7 +294,7 @@ def stabiliser_program(robot: Robot, right: str, left: str) -> Program:
     steps = recorder.input("steps", 2, 3)
     (more,), (height,) = recorder.input("more", 1), recorder.input("height", 1)
     command, (feedback,) = recorder.input("command", n), recorder.input("feedback", 1)
-    senses = Senses(attitude, q, (force[0], force[1]), ((p[0], p[1]), (p[2], p[3])))
+    senses = Sensed(attitude, q, (force[0], force[1]), ((p[0], p[1]), (p[2], p[3])))
     first, second = ((steps[k], steps[k + 1], steps[k + 2]) for k in (0, 3))
     after, joints, landed = cycle(
         walker, memory, senses, Ahead((first, second), more, height), command, feedback

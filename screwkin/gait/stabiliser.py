@@ -22,16 +22,16 @@ from screwkin.gait.stabiliser_law import (
     clipped,
     either,
     first_shift,
-    landing,
-    minus,
     nominal_place,
+    pair_difference,
+    pair_sum,
+    pair_turned,
+    pair_within,
     pendulum,
-    plus,
     progress,
     raised,
+    step_landing,
     stopping_zmp,
-    turned,
-    within,
 )
 from screwkin.ik.closed import ClosedForm, closed_form
 from screwkin.kinematics.landmarks import waist_frame
@@ -79,7 +79,7 @@ class Memory:
 
 
 @dataclass(frozen=True)
-class Senses:
+class Sensed:
     """What a robot feels: turn of its base against the vertical (any heading), and joint positions [rad].
 
     By foot, right and left: vertical force [N] and centre of pressure in the tip's axes [m]. Without force
@@ -130,7 +130,7 @@ class Leg:
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class WalkingBody:
     """A robot with two legs that closed forms solve: right and left."""
 
     robot: Robot
@@ -152,7 +152,7 @@ class Body:
         return q
 
 
-def body_of(robot: Robot, right: str, left: str, share: Scalar) -> Body:
+def body_of(robot: Robot, right: str, left: str, share: Scalar) -> WalkingBody:
     """The body of a robot.
 
     Args:
@@ -169,7 +169,7 @@ def body_of(robot: Robot, right: str, left: str, share: Scalar) -> Body:
     first, second = (
         Leg.of(SerialChain.of(robot, tip), pose_in_base(robot, D, tip), q) for tip in (right, left)
     )
-    return Body(robot, (first, second), (right, left), waist_frame(robot).inverse, share)
+    return WalkingBody(robot, (first, second), (right, left), waist_frame(robot).inverse, share)
 
 
 @dataclass(frozen=True)
@@ -181,7 +181,7 @@ class _Seen:
     valid: Scalar
 
 
-def _measured(body: Body, rhythm: Rhythm, memory: Memory, senses: Senses, swings: Scalar) -> _Seen:
+def _measured(body: WalkingBody, rhythm: Rhythm, memory: Memory, senses: Sensed, swings: Scalar) -> _Seen:
     """Where the CoM is, by the foot that bears: the stance foot, or the other where that is in the air."""
     D = link_displacements(body.robot, senses.q)
     com = senses.attitude @ mass_center(body.robot, D)
@@ -198,7 +198,7 @@ def _measured(body: Body, rhythm: Rhythm, memory: Memory, senses: Senses, swings
     at = either(aloft, memory.other, memory.stance)
     outward = where(aloft, -memory.side, memory.side) * rhythm.middle[1]
     (hx, hy), mx = rhythm.half, rhythm.middle[0]
-    k = within((kx, ky), (mx - hx, outward - hy), (mx + hx, outward + hy))
+    k = pair_within((kx, ky), (mx - hx, outward - hy), (mx + hx, outward + hy))
     pivot = Vector(px + xx * k[0] + yx * k[1], py + xy * k[0] + yy * k[1], pz + xz * k[0] + yz * k[1])
     # Turn about the vertical from the IMU's heading to the plan's.
     size = sqrt(xx * xx + xy * xy)
@@ -206,7 +206,7 @@ def _measured(body: Body, rhythm: Rhythm, memory: Memory, senses: Senses, swings
     c, s = cf * ch + sf * sh, sf * ch - cf * sh
     turn = Rotation(Vector(c, s, 0), Vector(-s, c, 0), Z)
     arm = turn @ (com - pivot)
-    place = plus(plus((at[0], at[1]), turned(k, at[2])), (arm.x, arm.y))
+    place = pair_sum(pair_sum((at[0], at[1]), pair_turned(k, at[2])), (arm.x, arm.y))
     return _Seen(place, turn @ senses.attitude @ body.T_waist_base.R.T, where(swings & aloft, 0.0, 1.0))
 
 
@@ -215,10 +215,10 @@ def _column(v: Vector) -> tuple[Scalar, Scalar, Scalar]:
 
 
 @dataclass(frozen=True, eq=False)
-class Walker:
+class StabilisedBody:
     """What is constant in a stabilised walk: the robot's body, the walk and how it is stabilised."""
 
-    body: Body
+    body: WalkingBody
     rhythm: Rhythm
     gains: Gains
 
@@ -226,22 +226,22 @@ class Walker:
 def _estimated(rhythm: Rhythm, gains: Gains, memory: Memory, seen: _Seen) -> tuple[Pair, ...]:
     """Gap, its rate and the DCM's error; slope, lean and what lasts of the gap: all filtered."""
     good, dt = seen.valid > 0.5, rhythm.dt
-    off = minus(seen.com, memory.com)
-    lasting = plus(memory.lasting, minus(off, memory.lasting), dt / gains.level_time)
-    gap = minus(off, lasting)
+    off = pair_difference(seen.com, memory.com)
+    lasting = pair_sum(memory.lasting, pair_difference(off, memory.lasting), dt / gains.level_time)
+    gap = pair_difference(off, lasting)
     old = either(memory.seen > 0.5, memory.gap, gap)
-    speed = within(((gap[0] - old[0]) / dt, (gap[1] - old[1]) / dt), (-0.6, -0.6), (0.6, 0.6))
-    rate = plus(memory.gap_rate, minus(speed, memory.gap_rate), gains.rate_filter)
+    speed = pair_within(((gap[0] - old[0]) / dt, (gap[1] - old[1]) / dt), (-0.6, -0.6), (0.6, 0.6))
+    rate = pair_sum(memory.gap_rate, pair_difference(speed, memory.gap_rate), gains.rate_filter)
     far = gains.largest
-    whole = plus(gap, rate, 1.0 / rhythm.w)
-    beyond = minus(whole, within(whole, (-gains.dead, -gains.dead), (gains.dead, gains.dead)))
-    error = within(beyond, (-far, -far), (far, far))
+    whole = pair_sum(gap, rate, 1.0 / rhythm.w)
+    beyond = pair_difference(whole, pair_within(whole, (-gains.dead, -gains.dead), (gains.dead, gains.dead)))
+    error = pair_within(beyond, (-far, -far), (far, far))
     R = seen.attitude
     about = atan2(-R.z.y, R.z.z), atan2(R.z.x, R.z.z)
-    bounded = within(about, (-0.1, -0.1), (0.1, 0.1))
-    slope = plus(memory.slope, minus(bounded, memory.slope), dt / gains.level_time)
-    beside = within(minus(about, slope), (-0.25, -0.25), (0.25, 0.25))
-    lean = plus(memory.lean, minus(beside, memory.lean), gains.lean_filter)
+    bounded = pair_within(about, (-0.1, -0.1), (0.1, 0.1))
+    slope = pair_sum(memory.slope, pair_difference(bounded, memory.slope), dt / gains.level_time)
+    beside = pair_within(pair_difference(about, slope), (-0.25, -0.25), (0.25, 0.25))
+    lean = pair_sum(memory.lean, pair_difference(beside, memory.lean), gains.lean_filter)
     news = gap, rate, error, slope, lean, lasting
     olds = memory.gap, memory.gap_rate, memory.error, memory.slope, memory.lean, memory.lasting
     return tuple(_pair(either(good, new, old)) for new, old in zip(news, olds, strict=True))
@@ -252,7 +252,12 @@ def _pair(two: Sequence[Scalar]) -> Pair:
 
 
 def cycle(
-    walker: Walker, memory: Memory, senses: Senses, ahead: Ahead, q: Sequence[Scalar], feedback: Scalar
+    walker: StabilisedBody,
+    memory: Memory,
+    senses: Sensed,
+    ahead: Ahead,
+    q: Sequence[Scalar],
+    feedback: Scalar,
 ) -> tuple[Memory, list[Scalar], Scalar]:
     """One cycle: the memory after it, joint positions to command, and 1 if a foot landed in it, else 0.
 
@@ -274,16 +279,20 @@ def cycle(
     pulls = where(starting, 0.0, seen.valid) * w
     rate = tuple(v + pulls * k * e for v, k, e in zip(memory.rate, gains.pull, error, strict=True))
     origin, yaw = (memory.stance[0], memory.stance[1]), memory.stance[2]
-    dcm = turned(minus(plus(memory.com, _pair(rate), 1.0 / w), origin), -yaw)
-    beside = turned(minus(_pair(memory.other), origin), -yaw)
-    stood = turned(minus(memory.zmp, origin), -yaw)
-    decided = landing(rhythm, gains, memory, dcm, stood, [step[:2] for step in ahead.steps], feedback)
+    dcm = pair_turned(pair_difference(pair_sum(memory.com, _pair(rate), 1.0 / w), origin), -yaw)
+    beside = pair_turned(pair_difference(_pair(memory.other), origin), -yaw)
+    stood = pair_turned(pair_difference(memory.zmp, origin), -yaw)
+    decided = step_landing(rhythm, gains, memory, dcm, stood, [step[:2] for step in ahead.steps], feedback)
     now = _now(rhythm, memory, decided, starting, stepping, ahead)
-    there = plus(now.place_before, turned((rhythm.middle[0], now.side * rhythm.middle[1]), ahead.steps[0][2]))
+    there = pair_sum(
+        now.place_before, pair_turned((rhythm.middle[0], now.side * rhythm.middle[1]), ahead.steps[0][2])
+    )
     at_rest = either(starting, first_shift(rhythm, memory, dcm, beside), stopping_zmp(rhythm, dcm, beside))
     zmp = either(stepping, either(now.lands, there, decided.zmp), at_rest)
     ease = where(stepping, dt / larger(rhythm.both - now.tau, dt), 0.3)
-    zmp = plus(memory.zmp, minus(plus(origin, turned(_pair(zmp), yaw)), memory.zmp), ease)
+    zmp = pair_sum(
+        memory.zmp, pair_difference(pair_sum(origin, pair_turned(_pair(zmp), yaw)), memory.zmp), ease
+    )
     com, rate = pendulum(memory.com, _pair(rate), zmp, w, dt)
     share = where(stepping & ~now.lands, now.share, 0.0)
     swing = _swing(rhythm, gains, now, share, _pair(lean), feedback)
@@ -322,7 +331,7 @@ def _now(
     lands = stepping & (tau >= decided.period - 1e-9)
     begins = starting & (tau >= rhythm.beginning - 1e-9)
     anew = lands | begins
-    spot = turned(decided.place, yaw)
+    spot = pair_turned(decided.place, yaw)
     landed = (memory.stance[0] + spot[0], memory.stance[1] + spot[1], yaw + first[2])
     mode = where(begins, STEPPING, where(lands, where(ahead.more > 0.5, STEPPING, STOPPING), memory.mode))
     place = either(stepping, decided.place, memory.place)
@@ -353,7 +362,7 @@ def _now(
 def _swing(rhythm: Rhythm, gains: Gains, now: _Now, share: Scalar, lean: Pair, feedback: Scalar) -> Pose:
     """Sole of the other foot on the floor: on its way, and turned about the stance foot against the lean."""
     x, y, yaw = now.stance
-    spot = turned(now.place, yaw)
+    spot = pair_turned(now.place, yaw)
     goal = (x + spot[0], y + spot[1], yaw + now.turn)
     gone = progress(share)
     at = [a + (b - a) * gone for a, b in zip(now.other, goal, strict=True)]
@@ -365,7 +374,7 @@ def _swing(rhythm: Rhythm, gains: Gains, now: _Now, share: Scalar, lean: Pair, f
 
 
 def _whole(
-    body: Body, height: Scalar, now: _Now, swing: Pose, com: Pair, waist: Pair, q: Sequence[Scalar]
+    body: WalkingBody, height: Scalar, now: _Now, swing: Pose, com: Pair, waist: Pair, q: Sequence[Scalar]
 ) -> tuple[Pair, list[Scalar]]:
     """Waist and joint positions that bring the CoM over the pendulum: one step of Newton's method a cycle."""
     x, y, yaw = now.stance
@@ -379,9 +388,9 @@ def _whole(
 
     near = body.posture(frame(waist), feet, q)
     center = frame(waist) @ body.T_waist_base @ body.center(near)
-    error = minus(com, (center.x, center.y))
-    moved = within((error[0] / body.share, error[1] / body.share), (-0.01, -0.01), (0.01, 0.01))
-    waist = plus(waist, moved)
+    error = pair_difference(com, (center.x, center.y))
+    moved = pair_within((error[0] / body.share, error[1] / body.share), (-0.01, -0.01), (0.01, 0.01))
+    waist = pair_sum(waist, moved)
     return waist, body.posture(frame(waist), feet, near)
 
 

@@ -76,7 +76,7 @@ def of_row(kind: type[T], scalars: Sequence[Scalar]) -> T:
     return kind(**values)
 
 
-def size_of(kind: type) -> int:
+def scalars_in(kind: type) -> int:
     """How many scalars a record of that kind has."""
     return sum(SIZES[str(f.type)] for f in fields(kind))
 
@@ -85,23 +85,23 @@ SIZES = {"Scalar": 1, "Pair": 2, "Place": 3}
 """Scalars of a field, by its annotation."""
 
 
-def turned(p: Pair, angle: Scalar) -> Pair:
+def pair_turned(p: Pair, angle: Scalar) -> Pair:
     """A vector turned by an angle."""
     c, s = cos(angle), sin(angle)
     return c * p[0] - s * p[1], s * p[0] + c * p[1]
 
 
-def plus(a: Pair, b: Pair, factor: Scalar = 1.0) -> Pair:
+def pair_sum(a: Pair, b: Pair, factor: Scalar = 1.0) -> Pair:
     """a + factor b."""
     return a[0] + factor * b[0], a[1] + factor * b[1]
 
 
-def minus(a: Pair, b: Pair) -> Pair:
+def pair_difference(a: Pair, b: Pair) -> Pair:
     """a - b."""
     return a[0] - b[0], a[1] - b[1]
 
 
-def within(p: Pair, low: Pair, high: Pair) -> Pair:
+def pair_within(p: Pair, low: Pair, high: Pair) -> Pair:
     """p in a box, or the nearest point of it."""
     return clipped(p[0], low[0], high[0]), clipped(p[1], low[1], high[1])
 
@@ -115,9 +115,9 @@ def pendulum(com: Pair, rate: Pair, zmp: Pair, w: Scalar, dt: Scalar) -> tuple[P
     """Place and rate of the pendulum after dt on a fixed ZMP: exact."""
     grown = exponential(w * dt)
     c, s = 0.5 * (grown + 1.0 / grown), 0.5 * (grown - 1.0 / grown)
-    off = minus(com, zmp)
+    off = pair_difference(com, zmp)
     return (
-        plus(plus(zmp, off, c), rate, s / w),
+        pair_sum(pair_sum(zmp, off, c), rate, s / w),
         (w * s * off[0] + c * rate[0], w * s * off[1] + c * rate[1]),
     )
 
@@ -242,7 +242,7 @@ def nominal_place(rhythm: Rhythm, side: Scalar, step: Sequence[Scalar]) -> Pair:
     return step[0], step[1] - side * (2.0 * rhythm.apart)
 
 
-class Course(Protocol):
+class StepState(Protocol):
     """What the law asks of a walk in course; see ``stabiliser.Memory``."""
 
     @property
@@ -266,10 +266,10 @@ class Course(Protocol):
         """Landing place of the cycle before."""
 
 
-def landing(
+def step_landing(
     rhythm: Rhythm,
     gains: Gains,
-    course: Course,
+    course: StepState,
     dcm: Pair,
     zmp: Pair,
     steps: Sequence[Sequence[Scalar]],
@@ -291,8 +291,8 @@ def landing(
     (cx, cy), (hx, hy) = rhythm.middle, rhythm.half
     here, there = (cx, side * cy), (cx, -side * cy)
     nominal = nominal_place(rhythm, side, steps[0])
-    came = minus(plus(nominal, there), here)
-    goal = plus(plus(nominal, there), entry(rhythm, -side, came, steps[1]))  # DCM as the step ends
+    came = pair_difference(pair_sum(nominal, there), here)
+    goal = pair_sum(pair_sum(nominal, there), entry(rhythm, -side, came, steps[1]))  # DCM as the step ends
     left = larger(course.period - tau, dt)
     growth = exponential(w * left)
     ramp = growth * waited(w * clipped(rhythm.both - tau, 0.0, rhythm.both))
@@ -302,11 +302,11 @@ def landing(
     far = left > 0.1
     held = where(far, wanted[0], course.held[0]), where(far, wanted[1], course.held[1])
     room = gains.sole * (hx - gains.margin), gains.sole * (hy - gains.margin)
-    aim = within(held, minus(here, room), plus(here, room))
+    aim = pair_within(held, pair_difference(here, room), pair_sum(here, room))
     period = _timed(rhythm, gains, course, goal[1] - aim[1], dcm[1] - aim[1], feedback)
     growth = exponential(w * larger(period - tau, dt))
-    end = plus(plus(aim, minus(dcm, aim), growth), minus(zmp, aim), -ramp)
-    free = plus(nominal, minus(end, goal), gains.step * feedback)  # what the ZMP leaves
+    end = pair_sum(pair_sum(aim, pair_difference(dcm, aim), growth), pair_difference(zmp, aim), -ramp)
+    free = pair_sum(nominal, pair_difference(end, goal), gains.step * feedback)  # what the ZMP leaves
     (rx, ry), wide = gains.reach, 2.0 * rhythm.apart
     close = larger(wide - ry, 2.0 * (hy - cy) + APART)
     bounded = (
@@ -314,14 +314,16 @@ def landing(
         -side * clipped(-side * free[1], close, wide + ry),
     )
     share = (tau - rhythm.both) / larger(period - rhythm.both, 1e-3)
-    moved = plus(course.place, within(minus(bounded, course.place), (-QUICK, -QUICK), (QUICK, QUICK)))
+    moved = pair_sum(
+        course.place, pair_within(pair_difference(bounded, course.place), (-QUICK, -QUICK), (QUICK, QUICK))
+    )
     still = share >= LATE
     chosen = where(still, course.place[0], moved[0]), where(still, course.place[1], moved[1])
     return Landing(aim, chosen, period, held)
 
 
 def _timed(
-    rhythm: Rhythm, gains: Gains, course: Course, wanted: Scalar, now: Scalar, feedback: Scalar
+    rhythm: Rhythm, gains: Gains, course: StepState, wanted: Scalar, now: Scalar, feedback: Scalar
 ) -> Scalar:
     """Duration of the step with which the DCM aside grows from where it is to where the next step wants it.
 
@@ -338,7 +340,7 @@ def _timed(
     return where(free, timed, course.period)
 
 
-def first_shift(rhythm: Rhythm, course: Course, dcm: Pair, beside: Pair) -> Pair:
+def first_shift(rhythm: Rhythm, course: StepState, dcm: Pair, beside: Pair) -> Pair:
     """ZMP that brings the DCM from rest to where the first step wants it, within both soles.
 
     Args:
@@ -348,7 +350,7 @@ def first_shift(rhythm: Rhythm, course: Course, dcm: Pair, beside: Pair) -> Pair
         beside: the other foot, in them.
     """
     side, (cx, cy) = course.side, rhythm.middle
-    goal = plus((cx, side * cy), entry(rhythm, side, (0.0, side * (rhythm.apart + cy)), (0.0, 0.0)))
+    goal = pair_sum((cx, side * cy), entry(rhythm, side, (0.0, side * (rhythm.apart + cy)), (0.0, 0.0)))
     settle = exponential(rhythm.w * larger(rhythm.beginning - course.tau, 0.08))
     zmp = tuple((g - x * settle) / (1.0 - settle) for g, x in zip(goal, dcm, strict=True))
     return _between(rhythm, (zmp[0], zmp[1]), beside)
@@ -357,7 +359,7 @@ def first_shift(rhythm: Rhythm, course: Course, dcm: Pair, beside: Pair) -> Pair
 def stopping_zmp(rhythm: Rhythm, dcm: Pair, beside: Pair) -> Pair:
     """ZMP that brings the DCM to rest between the feet, within both soles."""
     middle = 0.5 * beside[0] + rhythm.middle[0], 0.5 * beside[1]
-    return _between(rhythm, plus(middle, minus(dcm, middle), 1.5), beside)
+    return _between(rhythm, pair_sum(middle, pair_difference(dcm, middle), 1.5), beside)
 
 
 def _between(rhythm: Rhythm, zmp: Pair, beside: Pair) -> Pair:
@@ -365,4 +367,4 @@ def _between(rhythm: Rhythm, zmp: Pair, beside: Pair) -> Pair:
     (hx, hy), mx = rhythm.half, rhythm.middle[0]
     low = least(beside[0], 0.0) + mx - 0.75 * hx, least(beside[1], 0.0) - 0.75 * hy
     high = larger(beside[0], 0.0) + mx + 0.75 * hx, larger(beside[1], 0.0) + 0.75 * hy
-    return within(zmp, low, high)
+    return pair_within(zmp, low, high)

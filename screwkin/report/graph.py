@@ -37,7 +37,7 @@ def mechanism_graph(mechanism: Mechanism) -> Figure:
 
     Numbers with an arrow are the circuits and their sense, each beside a chain that no other one has.
     """
-    chains = chains_of(mechanism)
+    chains = branch_chains(mechanism)
     places, paths = laid_out(mechanism, chains)
     figure, axes = new_figure(7.6)
     axes.set_axis_off()
@@ -69,7 +69,7 @@ def mechanism_graph(mechanism: Mechanism) -> Figure:
     return figure
 
 
-def chains_of(mechanism: Mechanism) -> list[Chain]:
+def branch_chains(mechanism: Mechanism) -> list[Chain]:
     """The chains between branching links; a single circuit is one chain from a link to itself."""
     branching = _branching(mechanism)
     at: dict[str, list[int]] = {link: [] for link in mechanism.links}

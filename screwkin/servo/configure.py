@@ -83,7 +83,7 @@ def saved(bus: Bus, bounds: Bounds, k: int) -> SavedServo:
     return SavedServo(bounds.names[k], id, profile.model, {name: raw.hex() for name, raw in data.items()})
 
 
-def planned(bounds: Bounds, k: int, before: SavedServo) -> tuple[Change, ...]:
+def planned_changes(bounds: Bounds, k: int, before: SavedServo) -> tuple[Change, ...]:
     """The registers of the servo of joint k that hold something else than the table wants."""
     profile = bounds.profiles[k]
     held = {name: bytes.fromhex(text) for name, text in before.registers.items()}

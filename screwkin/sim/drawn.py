@@ -77,7 +77,9 @@ NOWHERE = Spread(
 _LIGHTEST = 0.05  # least factor of a mass, however far it is scaled
 
 
-def drawn(robot: Robot, seed: int, spread: Spread, duration: float, distance: float = 0.0) -> Perturbation:
+def drawn_world(
+    robot: Robot, seed: int, spread: Spread, duration: float, distance: float = 0.0
+) -> Perturbation:
     """The world of a seed.
 
     Every figure has a stream of its own, so that one does not depend on which others may differ.
@@ -91,8 +93,9 @@ def drawn(robot: Robot, seed: int, spread: Spread, duration: float, distance: fl
 
     Example:
         >>> import screwkin as sk
-        >>> from screwkin.sim.drawn import Spread, drawn
-        >>> drawn(sk.load_robot(sk.robot_names()[0]), 3, Spread().only("friction"), 5.0).to_dict().keys()
+        >>> from screwkin.sim.drawn import Spread, drawn_world
+        >>> robot = sk.load_robot(sk.robot_names()[0])
+        >>> drawn_world(robot, 3, Spread().only("friction"), 5.0).to_dict().keys()
         dict_keys(['friction', 'seed'])
     """
 

@@ -76,7 +76,7 @@ class Look:
     @cached_property
     def axes(self) -> Array:
         """The same as rotation matrices (1 + n, 3, 3)."""
-        return rotations(self.turned)
+        return rotations_of_quats(self.turned)
 
     @cached_property
     def touches(self) -> Any:
@@ -84,7 +84,7 @@ class Look:
         return self._p.getContactPoints(self._body, **self._client)
 
 
-def rotations(quats_xyzw: Array) -> Array:
+def rotations_of_quats(quats_xyzw: Array) -> Array:
     """Rotation matrices (K, 3, 3) of unit quaternions (K, 4)."""
     squares = quats_xyzw[:, :, None] * quats_xyzw[:, None]
     return np.asarray((squares.reshape(-1, 16) @ _ROTATION).reshape(-1, 3, 3))
@@ -93,7 +93,7 @@ def rotations(quats_xyzw: Array) -> Array:
 def pose_of(position: Any, quat_xyzw: Any) -> Array:
     """Pose (4, 4) of a position and an orientation as PyBullet gives them."""
     T = np.eye(4)
-    T[:3, :3], T[:3, 3] = rotations(np.array([quat_xyzw]))[0], position
+    T[:3, :3], T[:3, 3] = rotations_of_quats(np.array([quat_xyzw]))[0], position
     return T
 
 

@@ -27,7 +27,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.errors import InputError
 from screwkin.model.robot import Robot
-from screwkin.sim.pybullet_look import Look, rotations
+from screwkin.sim.pybullet_look import Look, rotations_of_quats
 
 SHARE = 0.5
 """Part of the improvement that is made in one step, as friction in the joints is not known to it."""
@@ -91,7 +91,7 @@ class RelativeRotors:
         self._fixed = FIXED * sum(d[0] for d in dynamics)
         self._root_mass = np.sqrt([d[0] for d in dynamics])[:, None, None]
         self._root_inertia = np.sqrt([d[2] for d in dynamics])[:, :, None]
-        turned = rotations(np.array([d[4] for d in dynamics[1:]])).transpose(0, 2, 1)
+        turned = rotations_of_quats(np.array([d[4] for d in dynamics[1:]])).transpose(0, 2, 1)
         self._axes = turned @ np.array([info[13] for info in infos])[:, :, None]
         self._joint_in_inertial = -turned @ np.array([d[3] for d in dynamics[1:]])[:, :, None]
         self._row = {joint: k for k, joint in enumerate((-1, *joints))}

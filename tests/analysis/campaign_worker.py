@@ -10,7 +10,7 @@ import sys
 import time
 from pathlib import Path
 
-from screwkin.analysis.campaign import Campaign, Row
+from screwkin.analysis.campaign import Campaign, CampaignRow
 from screwkin.analysis.campaign_outcome import Outcome
 from screwkin.analysis.campaign_run import local_workers, outcomes
 from screwkin.analysis.campaign_store import journal
@@ -20,23 +20,23 @@ LETHAL = 7
 """The row whose process dies."""
 
 
-def play(row: Row) -> Outcome:
+def play(row: CampaignRow) -> Outcome:
     """An outcome that tells rows apart."""
     return Outcome(row.index, "stood", margin_mm=row.seed / 3 + int(row.values["Tc"]))
 
 
-def slow_play(row: Row) -> Outcome:
+def slow_play(row: CampaignRow) -> Outcome:
     time.sleep(0.02)
     return play(row)
 
 
-def lethal_play(row: Row) -> Outcome:
+def lethal_play(row: CampaignRow) -> Outcome:
     if row.index == LETHAL:
         os._exit(3)
     return play(row)
 
 
-def threads(row: Row) -> Outcome:
+def threads(row: CampaignRow) -> Outcome:
     """What a worker's environment says of threads."""
     return Outcome(row.index, "stood", reason=os.environ["OMP_NUM_THREADS"] + os.environ["MKL_NUM_THREADS"])
 

@@ -13,7 +13,7 @@ from screwkin.analysis.campaign import (
     MOST_ROWS,
     Campaign,
     axis_values,
-    check_size,
+    check_rows,
     load_seeds,
     seeds_from,
 )
@@ -116,8 +116,8 @@ def test_a_file_of_seeds_with_a_fault_is_refused_by_its_line(tmp_path, text, mes
 
 def test_a_campaign_that_would_never_end_is_refused_with_its_sizes():
     axes = {"a": tuple(map(str, range(1000))), "b": ("1",), "c": tuple(map(str, range(100)))}
-    check_size(axes, MOST_ROWS // 100_000)
+    check_rows(axes, MOST_ROWS // 100_000)
     with pytest.raises(InputError, match="a 1,000 x c 100 x 11 runs"):
-        check_size(axes, 1 + MOST_ROWS // 100_000)
+        check_rows(axes, 1 + MOST_ROWS // 100_000)
     with pytest.raises(InputError, match="--seed -1"):
         seeds_from(-1, 3)

@@ -11,10 +11,10 @@ import pytest
 
 import screwkin as sk
 from screwkin.analysis import campaign_row
-from screwkin.analysis.campaign import Campaign, Row
+from screwkin.analysis.campaign import Campaign, CampaignRow
 from screwkin.analysis.campaign_outcome import Outcome, outcome_from_dict
-from screwkin.analysis.campaign_row import gait_of, planned, played
-from screwkin.analysis.campaign_sheet import finished, rows_arrays, rows_csv
+from screwkin.analysis.campaign_row import gait_of, played_row, walk_of_setting
+from screwkin.analysis.campaign_sheet import finished_rows, rows_arrays, rows_csv
 from screwkin.errors import GaitError, UnreachableError
 from screwkin.files import npz_bytes, read_npz
 from screwkin.model.robot import robot_text
@@ -32,9 +32,9 @@ def campaign(**axes: tuple[str, ...]) -> Campaign:
 def test_a_row_is_the_walk_of_its_setting_and_its_verdict():
     plan = campaign(Tc=("1.2",))
     walk = sk.walk(ROBOT, GAIT.replace(Tc="1.2"))
-    assert planned(plan, plan.rows[0].values).sha256 == walk.sha256
+    assert walk_of_setting(plan, plan.rows[0].values).sha256 == walk.sha256
     check = sk.validate(ROBOT, walk, "kinematic")
-    outcome = played(plan, plan.rows[1])
+    outcome = played_row(plan, plan.rows[1])
     assert outcome.row == 1
     assert outcome.margin_mm == check.min_margin_mm
     assert outcome.end_error_mm == check.end_error_mm
@@ -43,7 +43,7 @@ def test_a_row_is_the_walk_of_its_setting_and_its_verdict():
 
 def test_an_engine_without_forces_knows_of_no_fall():
     plan = campaign()
-    assert played(plan, plan.rows[0]).status == "planned"
+    assert played_row(plan, plan.rows[0]).status == "planned"
 
 
 def test_a_walk_that_cannot_be_is_refused_by_its_reason_once_planned(monkeypatch):
@@ -55,7 +55,7 @@ def test_a_walk_that_cannot_be_is_refused_by_its_reason_once_planned(monkeypatch
 
     monkeypatch.setattr(campaign_row, "walk", out_of_reach)
     plan = campaign(stride=("0.5",))
-    first, second = (played(plan, row) for row in plan.rows)
+    first, second = (played_row(plan, row) for row in plan.rows)
     assert first == Outcome(0, "refused", reason="right_leg out of reach")
     assert second == Outcome(1, "refused", reason="right_leg out of reach")
     assert len(calls) == 1
@@ -67,7 +67,7 @@ def test_what_fails_in_a_row_is_its_crash(monkeypatch):
 
     monkeypatch.setattr(campaign_row, "validate", broken)
     plan = campaign()
-    outcome = played(plan, plan.rows[0])
+    outcome = played_row(plan, plan.rows[0])
     assert (outcome.status, outcome.reason) == ("crashed", "ZeroDivisionError: of a simulator")
 
 
@@ -78,7 +78,7 @@ def test_an_interrupt_is_no_outcome(monkeypatch):
     monkeypatch.setattr(campaign_row, "validate", interrupted)
     plan = campaign()
     with pytest.raises(KeyboardInterrupt):
-        played(plan, plan.rows[0])
+        played_row(plan, plan.rows[0])
 
 
 def test_a_key_that_is_no_parameter_is_refused_before_anything_is_played():
@@ -93,7 +93,7 @@ def test_tables_hold_every_row_as_it_ended():
         2: Outcome(2, "refused", reason="out of reach, by 3 mm"),
         3: Outcome(3, "fell", fell_at=1.25, margin_mm=-2.0),
     }
-    rows = finished(plan, outcomes)
+    rows = finished_rows(plan, outcomes)
     arrays = read_npz(npz_bytes(rows_arrays(plan, rows)))
     assert arrays["row"].tolist() == [0, 2, 3]
     assert arrays["seed"].tolist() == [3, 3, 4]
@@ -112,5 +112,5 @@ def test_tables_hold_every_row_as_it_ended():
 
 def test_an_outcome_is_its_json_data():
     plan = campaign()
-    outcome = played(plan, Row(7, 0, 0, 3, plan.settings[0]))
+    outcome = played_row(plan, CampaignRow(7, 0, 0, 3, plan.settings[0]))
     assert outcome_from_dict(json.loads(json.dumps(outcome.to_dict()))) == outcome

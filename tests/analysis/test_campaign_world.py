@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import screwkin as sk
 from screwkin.analysis.campaign_world import AS_PLANNED, check_world, spread_of, world_of
 from screwkin.errors import InputError
-from screwkin.sim.drawn import NOWHERE, Spread, drawn
+from screwkin.sim.drawn import NOWHERE, Spread, drawn_world
 from screwkin.sim.perturbation import NONE
 from screwkin.sim.perturbation_files import described, perturbation_from_texts
 
@@ -22,7 +22,7 @@ SEEDS = st.integers(0, 2**53 - 1)
 @given(SEEDS, st.floats(0, 10).map(lambda x: round(x, 2)))
 def test_xn_is_the_usual_spread_so_many_times_as_far(seed, scale):
     text = f"x{scale:g}"
-    assert world_of(text, ROBOT, seed, 4.0, 0.3) == drawn(ROBOT, seed, Spread().scaled(scale), 4.0, 0.3)
+    assert world_of(text, ROBOT, seed, 4.0, 0.3) == drawn_world(ROBOT, seed, Spread().scaled(scale), 4.0, 0.3)
 
 
 @given(SEEDS, st.floats(-0.5, 0.5), st.floats(0.1, 2.0))

@@ -16,21 +16,28 @@ from screwkin.algebra.se3 import Pose, Rotation, Vector, X, as_array, pose_from_
 from screwkin.compiler.run import run
 from screwkin.errors import InputError
 from screwkin.gait.rhythm import CYCLE
-from screwkin.gait.stabilised import Course, Felt, StabilisedWalk, cycle_in_a_step, stabilised, stabiliser_of
+from screwkin.gait.stabilised import (
+    Felt,
+    StabilisedState,
+    StabilisedWalk,
+    cycle_in_a_step,
+    stabilised,
+    stabiliser_of,
+)
 from screwkin.gait.stabiliser import STARTING, STEPPING, STOPPING, Memory
 from screwkin.gait.stabiliser_law import (
     Gains,
     Rhythm,
     entry,
     exponential,
-    landing,
     logarithm,
     of_row,
     pendulum,
     progress,
     raised,
     row,
-    size_of,
+    scalars_in,
+    step_landing,
     waited,
 )
 from screwkin.model.robot import Robot
@@ -63,7 +70,7 @@ def level(q: np.ndarray) -> Felt:
     return Felt(np.eye(3), q, np.ones(2), np.zeros((2, 2)))
 
 
-def walked(walk: StabilisedWalk, cycles: int) -> list[Course]:
+def walked(walk: StabilisedWalk, cycles: int) -> list[StabilisedState]:
     """Open loop."""
     courses = [walk.start]
     for _ in range(cycles):
@@ -72,11 +79,11 @@ def walked(walk: StabilisedWalk, cycles: int) -> list[Course]:
 
 
 @pytest.fixture(scope="module")
-def courses(walk: StabilisedWalk) -> list[Course]:
+def courses(walk: StabilisedWalk) -> list[StabilisedState]:
     return walked(walk, len(walk.heights) + 40)
 
 
-def memory(course: Course) -> Memory:
+def memory(course: StabilisedState) -> Memory:
     return of_row(Memory, course.memory.tolist())
 
 
@@ -158,7 +165,7 @@ def test_even_steps_are_a_fixed_point_of_the_law(
             xi = tuple(c + v / rhythm.w - o for c, v, o in zip(com, rate, origin, strict=True))
             here = tuple(z - o for z, o in zip(zmp, origin, strict=True))
             course = _Course(tau, period, side, held, place)
-            decided = landing(rhythm, Gains(), course, xi, here, steps, 0.0)  # type: ignore[arg-type]
+            decided = step_landing(rhythm, Gains(), course, xi, here, steps, 0.0)  # type: ignore[arg-type]
             held = decided.held
             assert decided.period == period
             np.testing.assert_allclose(decided.place, (ahead, aside - side * 0.084), atol=1e-12)
@@ -186,7 +193,7 @@ class _Course:
 def test_records_survive_their_rows() -> None:
     gains = Gains(pull=(0.1, 0.2), reach=(0.3, 0.4))
     assert of_row(Gains, row(gains)) == gains
-    assert len(row(gains)) == size_of(Gains)
+    assert len(row(gains)) == scalars_in(Gains)
     assert of_row(Rhythm, row(RHYTHM)) == RHYTHM
 
 
@@ -202,7 +209,7 @@ def test_the_plan_s_own_rhythm_and_steps_are_read_off_it(walk: StabilisedWalk) -
 
 
 def test_open_loop_it_takes_the_planned_steps_and_comes_to_rest_between_the_feet(
-    walk: StabilisedWalk, plan: Trajectory, courses: list[Course]
+    walk: StabilisedWalk, plan: Trajectory, courses: list[StabilisedState]
 ) -> None:
     modes = [memory(course).mode for course in courses]
     assert [m for m, n in itertools.pairwise(modes) if m != n] == [STARTING, STEPPING]
@@ -218,7 +225,7 @@ def test_open_loop_it_takes_the_planned_steps_and_comes_to_rest_between_the_feet
 
 
 def test_in_single_support_the_zmp_is_on_the_sole_that_stands(
-    walk: StabilisedWalk, courses: list[Course]
+    walk: StabilisedWalk, courses: list[StabilisedState]
 ) -> None:
     """Whatever foot is off the floor, by the library's own forward kinematics."""
     swung = 0
@@ -234,7 +241,9 @@ def test_in_single_support_the_zmp_is_on_the_sole_that_stands(
     assert swung > 80
 
 
-def test_its_phase_is_that_of_the_plan(robot: Robot, walk: StabilisedWalk, courses: list[Course]) -> None:
+def test_its_phase_is_that_of_the_plan(
+    robot: Robot, walk: StabilisedWalk, courses: list[StabilisedState]
+) -> None:
     """Open loop it is as far as time is; the CoM is where the plan has it, and its period is the gait's."""
     plan = planned(robot, Tc=0.35)
     quick = stabilised(robot, plan)
@@ -248,7 +257,7 @@ def test_its_phase_is_that_of_the_plan(robot: Robot, walk: StabilisedWalk, cours
 
 
 def test_commands_allow_for_servos_as_those_of_the_plan(
-    robot: Robot, plan: Trajectory, walk: StabilisedWalk, courses: list[Course]
+    robot: Robot, plan: Trajectory, walk: StabilisedWalk, courses: list[StabilisedState]
 ) -> None:
     """Beside commands that differ from the plan by known angles, the walk's differ by them from the start."""
     bend = 0.1 * np.sin(np.outer(plan.time, 1.0 + np.arange(18)))
@@ -265,7 +274,9 @@ def test_commands_allow_for_servos_as_those_of_the_plan(
         np.testing.assert_allclose(added, expected, atol=2e-3)
 
 
-def test_what_lasts_and_what_is_small_is_left_alone(walk: StabilisedWalk, courses: list[Course]) -> None:
+def test_what_lasts_and_what_is_small_is_left_alone(
+    walk: StabilisedWalk, courses: list[StabilisedState]
+) -> None:
     """Errors of the DCM within the dead zone move no pendulum; a lean that lasts is noted as such."""
     k = next(k for k, course in enumerate(courses) if course.landed == 1 and memory(course).tau > 0.15)
     small = replace(level(courses[k].q), attitude=as_array(rotate(X, 0.01)))
@@ -278,7 +289,7 @@ def test_what_lasts_and_what_is_small_is_left_alone(walk: StabilisedWalk, course
 
 
 def test_soles_are_where_the_memory_has_them_and_the_com_over_the_pendulum(
-    robot: Robot, walk: StabilisedWalk, courses: list[Course]
+    robot: Robot, walk: StabilisedWalk, courses: list[StabilisedState]
 ) -> None:
     """By the library's own forward kinematics: the stance foot flat on the floor, the CoM within 1 mm."""
     T_waist_base = as_array(walk.body.T_waist_base)
@@ -330,7 +341,7 @@ def test_it_measures_the_com_whatever_the_imu_s_heading(
     np.testing.assert_allclose(np.add(after.gap, after.lasting) + now.com, expected, atol=1e-9)
 
 
-def test_without_feedback_nothing_felt_matters(walk: StabilisedWalk, courses: list[Course]) -> None:
+def test_without_feedback_nothing_felt_matters(walk: StabilisedWalk, courses: list[StabilisedState]) -> None:
     rng = np.random.default_rng(1)
     for course in courses[::40]:
         strange = Felt(
@@ -341,7 +352,9 @@ def test_without_feedback_nothing_felt_matters(walk: StabilisedWalk, courses: li
         assert memory(one).com == memory(other).com
 
 
-def test_a_robot_that_does_what_it_is_told_is_left_alone(walk: StabilisedWalk, courses: list[Course]) -> None:
+def test_a_robot_that_does_what_it_is_told_is_left_alone(
+    walk: StabilisedWalk, courses: list[StabilisedState]
+) -> None:
     """Perfect tracking a cycle late: the stabilised walk stays within millimetres of the open one."""
     course = walk.start
     for other in courses[1 : len(walk.heights)]:
@@ -352,7 +365,7 @@ def test_a_robot_that_does_what_it_is_told_is_left_alone(walk: StabilisedWalk, c
 
 
 def test_a_push_aside_lets_the_foot_land_where_the_robot_falls(
-    walk: StabilisedWalk, courses: list[Course]
+    walk: StabilisedWalk, courses: list[StabilisedState]
 ) -> None:
     """A trunk that leans out over the stance foot in mid step: the CoM is felt there, so it lands nearer."""
     k = next(k for k, course in enumerate(courses) if course.landed == 1 and memory(course).tau > 0.11)
@@ -368,7 +381,7 @@ def test_a_push_aside_lets_the_foot_land_where_the_robot_falls(
     assert places[1] < places[0] - 5e-4
 
 
-def test_left_and_right_are_alike(robot: Robot, walk: StabilisedWalk, courses: list[Course]) -> None:
+def test_left_and_right_are_alike(robot: Robot, walk: StabilisedWalk, courses: list[StabilisedState]) -> None:
     """The walk that begins with the other foot is the mirror image: CoM, ZMP and feet."""
     other = stabilised(robot, planned(robot, 2, first="left"))
     mirrored = walked(replace(other, rhythm=walk.rhythm, body=walk.body, steps=walk.steps), 130)

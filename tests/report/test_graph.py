@@ -7,7 +7,7 @@ import pytest
 
 import screwkin as sk
 from screwkin.mechanism.graph import CouplingGraph
-from screwkin.report.graph import chains_of, laid_out, mechanism_graph
+from screwkin.report.graph import branch_chains, laid_out, mechanism_graph
 from screwkin.report.style import styled
 
 
@@ -17,7 +17,7 @@ def mechanism(request: pytest.FixtureRequest) -> sk.Mechanism:
 
 
 def test_every_coupling_is_in_one_chain_and_ends_where_the_graph_says(mechanism: sk.Mechanism) -> None:
-    chains = chains_of(mechanism)
+    chains = branch_chains(mechanism)
     edges = [edge for chain in chains for edge in chain.edges]
     assert sorted(edges) == list(range(len(mechanism.edges)))
     for chain in chains:
@@ -27,7 +27,7 @@ def test_every_coupling_is_in_one_chain_and_ends_where_the_graph_says(mechanism:
 
 
 def test_links_stand_apart_and_chains_between_their_links(mechanism: sk.Mechanism) -> None:
-    chains = chains_of(mechanism)
+    chains = branch_chains(mechanism)
     places, paths = laid_out(mechanism, chains)
     assert set(places) == set(mechanism.links)
     spots = np.array(list(places.values()))
@@ -40,7 +40,7 @@ def test_links_stand_apart_and_chains_between_their_links(mechanism: sk.Mechanis
 def test_a_humanoid_of_24_joints_is_the_graph_of_figure_5() -> None:
     """Five chains between floor and torso: 54 joints, 51 links, four circuits."""
     mechanism = sk.closed_mechanism(sk.load_robot("bioloid24"))
-    chains = chains_of(mechanism)
+    chains = branch_chains(mechanism)
     assert [chain.ends for chain in chains] == [("floor", "torso")] * 5
     assert sorted(len(chain.edges) for chain in chains) == [6, 12, 12, 12, 12]
     with styled():
@@ -58,7 +58,7 @@ def test_senses_follow_the_circuit_matrix_of_a_single_loop() -> None:
     with styled():
         (axes,) = mechanism_graph(mechanism).axes
     (sense,) = [text.get_text()[0] for text in axes.texts if text.get_text()[:1] in ("\u21ba", "\u21bb")]
-    (chain,) = chains_of(mechanism)
+    (chain,) = branch_chains(mechanism)
     _, (path,) = laid_out(mechanism, [chain])
     x, y = path.T
     swept = float(np.sum(x[:-1] * y[1:] - x[1:] * y[:-1]))

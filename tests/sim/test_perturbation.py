@@ -19,7 +19,7 @@ from screwkin.motors.library import load_motor
 from screwkin.sim.backend import Backend, Command, Observation
 from screwkin.sim.compliant import Compliance, SpringServos
 from screwkin.sim.delay import DelayLine
-from screwkin.sim.drawn import NOWHERE, Spread, drawn
+from screwkin.sim.drawn import NOWHERE, Spread, drawn_world
 from screwkin.sim.drive import Actuation, RigidServos
 from screwkin.sim.motors import MotorServos
 from screwkin.sim.perturbation import DEFAULTS, NONE, Perturbation
@@ -312,8 +312,8 @@ def test_a_world_is_within_its_spread_and_survives_its_files(seed: int, scale: f
         dropped=0.05, imu_noise=0.01, imu_rate_noise=0.1, imu_bias=0.02, imu_rate_bias=0.02, sense_lag=0.01,
     )  # fmt: skip
     spread = full.scaled(scale)
-    world = drawn(robot, seed, spread, 4.0, 0.5)
-    assert world == drawn(robot, seed, spread, 4.0, 0.5)
+    world = drawn_world(robot, seed, spread, 4.0, 0.5)
+    assert world == drawn_world(robot, seed, spread, 4.0, 0.5)
     assert math.hypot(*world.slope) <= spread.slope + 1e-12
     assert 0.0 <= world.push_at <= 4.0
     low, high = spread.push
@@ -329,12 +329,12 @@ def test_a_world_is_within_its_spread_and_survives_its_files(seed: int, scale: f
 
 
 def test_what_may_differ_does_not_change_how_the_rest_is_drawn(robot: Robot) -> None:
-    both = drawn(robot, 5, Spread(), 4.0)
+    both = drawn_world(robot, 5, Spread(), 4.0)
     for key in ("friction", "mass", "stiffness", "lag"):
-        alone = drawn(robot, 5, Spread().only(key), 4.0)
+        alone = drawn_world(robot, 5, Spread().only(key), 4.0)
         assert getattr(alone, key) == getattr(both, key)
         assert set(alone.to_dict()) == {key, "seed"}
-    assert drawn(robot, 0, NOWHERE, 4.0) == NONE
+    assert drawn_world(robot, 0, NOWHERE, 4.0) == NONE
     with pytest.raises(InputError, match="valid: mass"):
         Spread().only("masses")
 

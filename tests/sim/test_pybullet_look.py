@@ -15,7 +15,7 @@ from screwkin.motors.library import motors_of
 from screwkin.sim.backend import Command
 from screwkin.sim.motors import MotorServos
 from screwkin.sim.pybullet import PyBulletBackend
-from screwkin.sim.pybullet_look import Look, rotations
+from screwkin.sim.pybullet_look import Look, rotations_of_quats
 
 ROBOT = sk.load_robot("bioloid")
 
@@ -38,7 +38,7 @@ class Counted:
 def test_rotations_are_those_of_quaternions(seed: int) -> None:
     quats = np.random.default_rng(seed).normal(size=(7, 4))
     quats /= np.linalg.norm(quats, axis=1, keepdims=True)
-    np.testing.assert_allclose(rotations(quats), Rotation.from_quat(quats).as_matrix(), atol=1e-14)
+    np.testing.assert_allclose(rotations_of_quats(quats), Rotation.from_quat(quats).as_matrix(), atol=1e-14)
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +81,7 @@ def test_the_mass_matrix_that_rotors_answer_to_is_the_robots(standing: PyBulletB
     look = Look(p, here, body, joints)
     rotors = standing._rotors
     assert rotors is not None
-    com, turned = look.com - look.com[0], rotations(look.turned)
+    com, turned = look.com - look.com[0], rotations_of_quats(look.turned)
     own = rotors._inertia(com, turned, rotors._twists(com[1:], turned[1:]))
     theirs = np.array(p.calculateMassMatrix(body, q.tolist(), **here))
     np.testing.assert_allclose(own[6:, 6:], theirs[6:, 6:], atol=1e-7)
