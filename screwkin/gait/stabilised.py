@@ -25,12 +25,11 @@ from screwkin.gait.stabiliser import (
     Memory,
     Sensed,
     StabilisedBody,
-    WalkingBody,
-    body_of,
     cycle,
 )
 from screwkin.gait.stabiliser_law import Gains, Rhythm, of_row, row, scalars_in
 from screwkin.gait.stance import stance_of
+from screwkin.gait.walking_body import WalkingBody, body_of
 from screwkin.kinematics.body import center_of_mass, frame_pose
 from screwkin.model.robot import Robot
 from screwkin.model.state import State

@@ -10,9 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from screwkin.algebra.scalar import Scalar, arc, atan2, cos, larger, sin, sqrt, where
+from screwkin.algebra.scalar import Scalar, atan2, cos, larger, sin, sqrt, where
 from screwkin.algebra.se3 import Pose, Rotation, Vector, X, Y, Z, leaves, rotate
 from screwkin.gait.stabiliser_law import (
     Gains,
@@ -33,12 +31,9 @@ from screwkin.gait.stabiliser_law import (
     step_landing,
     stopping_zmp,
 )
-from screwkin.ik.closed import ClosedForm, closed_form
-from screwkin.kinematics.landmarks import waist_frame
+from screwkin.gait.walking_body import WalkingBody
 from screwkin.kinematics.mass import mass_center
 from screwkin.kinematics.positions import link_displacements, pose_in_base
-from screwkin.kinematics.serial_chain import SerialChain
-from screwkin.model.robot import Robot
 
 Place = tuple[Scalar, Scalar, Scalar]
 """x, y, yaw of a foot on the floor."""
@@ -102,74 +97,6 @@ class Ahead:
     steps: tuple[Place, Place]
     more: Scalar
     height: Scalar
-
-
-@dataclass(frozen=True, eq=False)
-class Leg:
-    """A leg by its closed form, bent in the one way of a branch's number."""
-
-    form: ClosedForm
-    branch: int
-
-    @classmethod
-    def of(cls, chain: SerialChain, T_base_tip: Pose, q: Sequence[float]) -> Leg:
-        """A leg bent as in a posture q, which has its tip at that pose."""
-        form = closed_form(chain)
-        own = np.array([q[i] for i in chain.joints], dtype=float)
-        branches = np.array([branch[:-1] for branch in form.formula(T_base_tip)], dtype=float)
-        return cls(form, int(np.argmin((1.0 - np.cos(branches - own)).sum(axis=1))))
-
-    @property
-    def joints(self) -> list[int]:
-        """Its joints, by their number in the robot."""
-        return list(self.form.chain.joints)
-
-    def positions(self, T_base_tip: Pose) -> Sequence[Scalar]:
-        """Joint positions, within half a turn of zero; out of reach, stretched."""
-        return [arc(sin(x), cos(x)) for x in self.form.formula(T_base_tip)[self.branch][:-1]]
-
-
-@dataclass(frozen=True, eq=False)
-class WalkingBody:
-    """A robot with two legs that closed forms solve: right and left."""
-
-    robot: Robot
-    legs: tuple[Leg, Leg]
-    tips: tuple[str, str]
-    T_waist_base: Pose
-    share: Scalar
-
-    def center(self, q: Sequence[Scalar]) -> Vector:
-        """CoM in the base frame."""
-        return mass_center(self.robot, link_displacements(self.robot, q))
-
-    def posture(self, waist: Pose, feet: Sequence[Pose], rest: Sequence[Scalar]) -> list[Scalar]:
-        """Joint positions for a waist and soles in the world; other joints rest."""
-        base, q = (waist @ self.T_waist_base).inverse, list(rest)
-        for leg, foot in zip(self.legs, feet, strict=True):
-            for joint, x in zip(leg.joints, leg.positions(base @ foot), strict=True):
-                q[joint] = x
-        return q
-
-
-def body_of(robot: Robot, right: str, left: str, share: Scalar) -> WalkingBody:
-    """The body of a robot.
-
-    Args:
-        robot: with a posture ``home``, whose legs bend as they do there.
-        right: tip of the right foot.
-        left: tip of the left foot.
-        share: by how much the CoM moves with the waist while the feet stay.
-
-    Raises:
-        InputError: a leg has no closed form.
-    """
-    q = list(robot.posture("home").q)
-    D = link_displacements(robot, q)
-    first, second = (
-        Leg.of(SerialChain.of(robot, tip), pose_in_base(robot, D, tip), q) for tip in (right, left)
-    )
-    return WalkingBody(robot, (first, second), (right, left), waist_frame(robot).inverse, share)
 
 
 @dataclass(frozen=True)
