@@ -15,6 +15,7 @@ import screwkin as sk
 from screwkin.algebra.se3 import Pose, Rotation, Vector, X, as_array, pose_from_array, rotate
 from screwkin.compiler.run import run
 from screwkin.errors import InputError
+from screwkin.gait import stabiliser_law as law
 from screwkin.gait.rhythm import CYCLE
 from screwkin.gait.stabilised import (
     Felt,
@@ -28,21 +29,12 @@ from screwkin.gait.stabiliser import STARTING, STEPPING, STOPPING, Memory
 from screwkin.gait.stabiliser_law import (
     Gains,
     Rhythm,
-    entry,
-    exponential,
-    logarithm,
-    of_row,
-    pendulum,
-    progress,
-    raised,
-    row,
-    scalars_in,
-    step_landing,
-    waited,
 )
 from screwkin.model.robot import Robot
 from screwkin.sim.feedback import WalkController
 from screwkin.trajectory import Trajectory
+
+States = list[StabilisedState]
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +76,7 @@ def courses(walk: StabilisedWalk) -> list[StabilisedState]:
 
 
 def memory(course: StabilisedState) -> Memory:
-    return of_row(Memory, course.memory.tolist())
+    return law.of_row(Memory, course.memory.tolist())
 
 
 # ---- The law
@@ -92,12 +84,12 @@ def memory(course: StabilisedState) -> Memory:
 
 @given(st.floats(-16.0, 16.0))
 def test_the_exponential_is_that_of_the_library(x: float) -> None:
-    assert exponential(x) == pytest.approx(math.exp(x), rel=1e-12)
+    assert law.exponential(x) == pytest.approx(math.exp(x), rel=1e-12)
 
 
 @given(st.floats(0.5, 2.0))
 def test_the_logarithm_is_that_of_the_library(x: float) -> None:
-    assert logarithm(x) == pytest.approx(math.log(x), rel=1e-12, abs=1e-15)
+    assert law.logarithm(x) == pytest.approx(math.log(x), rel=1e-12, abs=1e-15)
 
 
 @given(z=st.floats(0.01, 3.0), x=st.floats(-0.1, 0.1), far=st.floats(-0.1, 0.1))
@@ -108,7 +100,7 @@ def test_a_zmp_on_its_way_lets_the_dcm_grow_by_its_waited_share(z: float, x: flo
     for k in range(steps):  # each over an even share of the ramp: exact but for the ramp's slope within it
         p = far * (1.0 - (k + 0.5) / steps)
         dcm = p + (dcm - p) * math.exp(w * dt)
-    assert dcm == pytest.approx((x - waited(z) * far) * math.exp(z), abs=1e-6)
+    assert dcm == pytest.approx((x - law.waited(z) * far) * math.exp(z), abs=1e-6)
 
 
 @given(
@@ -119,20 +111,20 @@ def test_a_zmp_on_its_way_lets_the_dcm_grow_by_its_waited_share(z: float, x: flo
 def test_a_pendulum_falls_from_its_zmp_as_its_equation_says(w: float, dt: float, values: list[float]) -> None:
     """The DCM grows by e^(w dt), its converging twin shrinks by it, and two halves make a whole."""
     com, rate, zmp = tuple(values[:2]), tuple(values[2:4]), tuple(values[4:])
-    after, speed = pendulum(com, rate, zmp, w, dt)
+    after, speed = law.pendulum(com, rate, zmp, w, dt)
     for k in (0, 1):
         for sign in (1.0, -1.0):
             before = com[k] - zmp[k] + sign * rate[k] / w
             assert after[k] - zmp[k] + sign * speed[k] / w == pytest.approx(
                 before * math.exp(sign * w * dt), abs=1e-9
             )
-    half = pendulum(*pendulum(com, rate, zmp, w, dt / 2), zmp, w, dt / 2)
+    half = law.pendulum(*law.pendulum(com, rate, zmp, w, dt / 2), zmp, w, dt / 2)
     np.testing.assert_allclose([*half[0], *half[1]], [*after, *speed], atol=1e-9)
 
 
 def test_a_swing_goes_from_0_to_1_and_a_lift_from_0_to_0_without_a_jump() -> None:
     u = np.linspace(0.0, 1.0, 2001)
-    way, height = np.array([progress(x) for x in u]), np.array([raised(x) for x in u])
+    way, height = np.array([law.progress(x) for x in u]), np.array([law.raised(x) for x in u])
     assert way[[0, 1000, -1]] == pytest.approx([0.0, 0.5, 1.0])
     assert height[[0, 1000, -1]] == pytest.approx([0.0, 1.0, 0.0])
     assert np.diff(way).min() >= -1e-12
@@ -156,7 +148,7 @@ def test_even_steps_are_a_fixed_point_of_the_law(
     rhythm = replace(RHYTHM, period=period, double=double, com_height=height)
     steps = [(ahead, aside)] * 2
     zmp, origin = (-ahead, -side * 0.084), (0.0, 0.0)
-    dcm = entry(rhythm, side, (ahead, side * 0.084), (ahead, aside))
+    dcm = law.entry(rhythm, side, (ahead, side * 0.084), (ahead, aside))
     com, rate = (dcm[0], dcm[1]), (0.0, 0.0)
     far = []
     for _ in range(4):
@@ -165,7 +157,7 @@ def test_even_steps_are_a_fixed_point_of_the_law(
             xi = tuple(c + v / rhythm.w - o for c, v, o in zip(com, rate, origin, strict=True))
             here = tuple(z - o for z, o in zip(zmp, origin, strict=True))
             course = _Course(tau, period, side, held, place)
-            decided = step_landing(rhythm, Gains(), course, xi, here, steps, 0.0)  # type: ignore[arg-type]
+            decided = law.step_landing(rhythm, Gains(), course, xi, here, steps, 0.0)  # type: ignore[arg-type]
             held = decided.held
             assert decided.period == period
             np.testing.assert_allclose(decided.place, (ahead, aside - side * 0.084), atol=1e-12)
@@ -173,7 +165,7 @@ def test_even_steps_are_a_fixed_point_of_the_law(
                 break
             ease = CYCLE / max(rhythm.both - tau, CYCLE)
             zmp = tuple(z + (o + p - z) * ease for z, o, p in zip(zmp, origin, decided.zmp, strict=True))
-            com, rate = pendulum(com, rate, zmp, rhythm.w, CYCLE)  # type: ignore[arg-type]
+            com, rate = law.pendulum(com, rate, zmp, rhythm.w, CYCLE)  # type: ignore[arg-type]
             far.append(np.abs(decided.zmp))
             tau += CYCLE
         origin = (origin[0] + ahead, origin[1] + aside - side * 0.084)
@@ -192,9 +184,9 @@ class _Course:
 
 def test_records_survive_their_rows() -> None:
     gains = Gains(pull=(0.1, 0.2), reach=(0.3, 0.4))
-    assert of_row(Gains, row(gains)) == gains
-    assert len(row(gains)) == scalars_in(Gains)
-    assert of_row(Rhythm, row(RHYTHM)) == RHYTHM
+    assert law.of_row(Gains, law.row(gains)) == gains
+    assert len(law.row(gains)) == law.scalars_in(Gains)
+    assert law.of_row(Rhythm, law.row(RHYTHM)) == RHYTHM
 
 
 def test_the_plan_s_own_rhythm_and_steps_are_read_off_it(walk: StabilisedWalk) -> None:
@@ -209,7 +201,7 @@ def test_the_plan_s_own_rhythm_and_steps_are_read_off_it(walk: StabilisedWalk) -
 
 
 def test_open_loop_it_takes_the_planned_steps_and_comes_to_rest_between_the_feet(
-    walk: StabilisedWalk, plan: Trajectory, courses: list[StabilisedState]
+    walk: StabilisedWalk, plan: Trajectory, courses: States
 ) -> None:
     modes = [memory(course).mode for course in courses]
     assert [m for m, n in itertools.pairwise(modes) if m != n] == [STARTING, STEPPING]
@@ -224,9 +216,7 @@ def test_open_loop_it_takes_the_planned_steps_and_comes_to_rest_between_the_feet
     assert abs(last.com[1]) < 2e-3
 
 
-def test_in_single_support_the_zmp_is_on_the_sole_that_stands(
-    walk: StabilisedWalk, courses: list[StabilisedState]
-) -> None:
+def test_in_single_support_the_zmp_is_on_the_sole_that_stands(walk: StabilisedWalk, courses: States) -> None:
     """Whatever foot is off the floor, by the library's own forward kinematics."""
     swung = 0
     for course in courses:
@@ -241,9 +231,7 @@ def test_in_single_support_the_zmp_is_on_the_sole_that_stands(
     assert swung > 80
 
 
-def test_its_phase_is_that_of_the_plan(
-    robot: Robot, walk: StabilisedWalk, courses: list[StabilisedState]
-) -> None:
+def test_its_phase_is_that_of_the_plan(robot: Robot, walk: StabilisedWalk, courses: States) -> None:
     """Open loop it is as far as time is; the CoM is where the plan has it, and its period is the gait's."""
     plan = planned(robot, Tc=0.35)
     quick = stabilised(robot, plan)
@@ -257,7 +245,7 @@ def test_its_phase_is_that_of_the_plan(
 
 
 def test_commands_allow_for_servos_as_those_of_the_plan(
-    robot: Robot, plan: Trajectory, walk: StabilisedWalk, courses: list[StabilisedState]
+    robot: Robot, plan: Trajectory, walk: StabilisedWalk, courses: States
 ) -> None:
     """Beside commands that differ from the plan by known angles, the walk's differ by them from the start."""
     bend = 0.1 * np.sin(np.outer(plan.time, 1.0 + np.arange(18)))
@@ -274,9 +262,7 @@ def test_commands_allow_for_servos_as_those_of_the_plan(
         np.testing.assert_allclose(added, expected, atol=2e-3)
 
 
-def test_what_lasts_and_what_is_small_is_left_alone(
-    walk: StabilisedWalk, courses: list[StabilisedState]
-) -> None:
+def test_what_lasts_and_what_is_small_is_left_alone(walk: StabilisedWalk, courses: States) -> None:
     """Errors of the DCM within the dead zone move no pendulum; a lean that lasts is noted as such."""
     k = next(k for k, course in enumerate(courses) if course.landed == 1 and memory(course).tau > 0.15)
     small = replace(level(courses[k].q), attitude=as_array(rotate(X, 0.01)))
@@ -289,7 +275,7 @@ def test_what_lasts_and_what_is_small_is_left_alone(
 
 
 def test_soles_are_where_the_memory_has_them_and_the_com_over_the_pendulum(
-    robot: Robot, walk: StabilisedWalk, courses: list[StabilisedState]
+    robot: Robot, walk: StabilisedWalk, courses: States
 ) -> None:
     """By the library's own forward kinematics: the stance foot flat on the floor, the CoM within 1 mm."""
     T_waist_base = as_array(walk.body.T_waist_base)
@@ -320,7 +306,7 @@ def test_it_measures_the_com_whatever_the_imu_s_heading(
     inputs = cycle_in_a_step(robot)
     rng = np.random.default_rng(seed)
     q = np.array(sk.home(robot).q) + rng.uniform(-0.1, 0.1, 18)
-    now = of_row(Memory, inputs["memory"].tolist())
+    now = law.of_row(Memory, inputs["memory"].tolist())
     cx, sx, cy, sy = math.cos(lean[0]), math.sin(lean[0]), math.cos(lean[1]), math.sin(lean[1])
     R = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]]) @ np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
     base = np.eye(4)
@@ -337,11 +323,11 @@ def test_it_measures_the_com_whatever_the_imu_s_heading(
         "force": np.array([0.0, 20.0]),
         "pressure": np.zeros((2, 2)),
     }
-    after = of_row(Memory, run(stabiliser_of(robot), inputs, ())["memory_after"].tolist())
+    after = law.of_row(Memory, run(stabiliser_of(robot), inputs, ())["memory_after"].tolist())
     np.testing.assert_allclose(np.add(after.gap, after.lasting) + now.com, expected, atol=1e-9)
 
 
-def test_without_feedback_nothing_felt_matters(walk: StabilisedWalk, courses: list[StabilisedState]) -> None:
+def test_without_feedback_nothing_felt_matters(walk: StabilisedWalk, courses: States) -> None:
     rng = np.random.default_rng(1)
     for course in courses[::40]:
         strange = Felt(
@@ -352,9 +338,7 @@ def test_without_feedback_nothing_felt_matters(walk: StabilisedWalk, courses: li
         assert memory(one).com == memory(other).com
 
 
-def test_a_robot_that_does_what_it_is_told_is_left_alone(
-    walk: StabilisedWalk, courses: list[StabilisedState]
-) -> None:
+def test_a_robot_that_does_what_it_is_told_is_left_alone(walk: StabilisedWalk, courses: States) -> None:
     """Perfect tracking a cycle late: the stabilised walk stays within millimetres of the open one."""
     course = walk.start
     for other in courses[1 : len(walk.heights)]:
@@ -364,9 +348,7 @@ def test_a_robot_that_does_what_it_is_told_is_left_alone(
     np.testing.assert_allclose(memory(course).stance, memory(other).stance, atol=5e-3)
 
 
-def test_a_push_aside_lets_the_foot_land_where_the_robot_falls(
-    walk: StabilisedWalk, courses: list[StabilisedState]
-) -> None:
+def test_a_push_aside_lets_the_foot_land_where_the_robot_falls(walk: StabilisedWalk, courses: States) -> None:
     """A trunk that leans out over the stance foot in mid step: the CoM is felt there, so it lands nearer."""
     k = next(k for k, course in enumerate(courses) if course.landed == 1 and memory(course).tau > 0.11)
     places = []
@@ -381,7 +363,7 @@ def test_a_push_aside_lets_the_foot_land_where_the_robot_falls(
     assert places[1] < places[0] - 5e-4
 
 
-def test_left_and_right_are_alike(robot: Robot, walk: StabilisedWalk, courses: list[StabilisedState]) -> None:
+def test_left_and_right_are_alike(robot: Robot, walk: StabilisedWalk, courses: States) -> None:
     """The walk that begins with the other foot is the mirror image: CoM, ZMP and feet."""
     other = stabilised(robot, planned(robot, 2, first="left"))
     mirrored = walked(replace(other, rhythm=walk.rhythm, body=walk.body, steps=walk.steps), 130)
