@@ -121,6 +121,11 @@ def steps_of(plan: Trajectory, tips: tuple[str, str], rhythm: Rhythm, swings: li
     return np.array(rows)
 
 
+def footholds_of(plan: Trajectory, tips: tuple[str, str], swings: list[Swing]) -> Array:
+    """Where the steps of a plan land (S, 3): x, y, yaw."""
+    return np.array([_place(plan, tips[swing.foot], swing.lands + 1) for swing in swings])
+
+
 def share_of(plan: Trajectory, body: WalkingBody) -> float:
     """How far the CoM moves with the waist while the feet stay, in the middle of a plan."""
     k = len(plan.time) // 2

@@ -16,7 +16,8 @@ from screwkin.compiler.records import identifier
 from screwkin.compiler.run import run
 from screwkin.errors import InputError
 from screwkin.gait.intended import intended
-from screwkin.gait.rhythm import CYCLE, rhythm_of, share_of, start_of, steps_of, swings_of
+from screwkin.gait.odometry import Whereabouts, back_to_plan
+from screwkin.gait.rhythm import CYCLE, footholds_of, rhythm_of, share_of, start_of, steps_of, swings_of
 from screwkin.gait.stabiliser import (
     STARTING,
     STEPPING,
@@ -36,6 +37,8 @@ from screwkin.model.state import State
 from screwkin.trajectory import Trajectory
 
 T = TypeVar("T")
+STANCE, OTHER = slice(4, 7), slice(7, 10)
+"""Where the feet stand in a memory's array."""
 KINDS = ("preview", "footsteps")
 """Kinds of gaits that a stabiliser can walk."""
 
@@ -58,27 +61,30 @@ class StabilisedState:
     """Where a stabilised walk is.
 
     memory (k,): see ``stabiliser.Memory``; q (n,): commanded joint positions; landed: steps that have; time
-    since the start [s].
+    since the start [s]; feet: where they stand by what was felt.
     """
 
     memory: Array
     q: Array
     landed: int
     time: float
+    feet: Whereabouts
 
 
 @dataclass(frozen=True, eq=False)
 class StabilisedWalk:
     """A plan and its stabiliser; nothing in it changes.
 
-    steps: (S, 3) displacements forward, left and turn, each in the axes of the foot that stands; by cycle, q
-    (K, n): planned joint positions, and heights (K,) of the waist [m]; start: the course at the beginning.
+    steps: (S, 3) displacements forward, left and turn, each in the axes of the foot that stands; footholds:
+    (S, 3) x, y, yaw where they land; by cycle, q (K, n): planned joint positions, and heights (K,) of the
+    waist [m]; start: the course at the beginning.
     """
 
     body: WalkingBody
     rhythm: Rhythm
     gains: Gains
     steps: Array
+    footholds: Array
     q: Array
     heights: Array
     start: StabilisedState
@@ -90,20 +96,42 @@ class StabilisedWalk:
 
     def advanced(self, course: StabilisedState, felt: Felt, feedback: bool = True) -> StabilisedState:
         """The course a cycle later, with the command for its end."""
-        answer = run(self.program, self.inputs(course, felt, feedback), ())
-        landed = course.landed + int(answer["landed"][0])
+        feet = self._felt(course, felt)
+        answer = run(self.program, self.inputs(replace(course, feet=feet), felt, feedback), ())
+        memory, lands = answer["memory_after"], int(answer["landed"][0])
+        if lands:
+            feet = feet.landed(memory[STANCE], memory[OTHER])
         return StabilisedState(
-            answer["memory_after"], answer["goal"], landed, course.time + float(self.rhythm.dt)
+            memory, answer["goal"], course.landed + lands, course.time + float(self.rhythm.dt), feet
         )
+
+    def _felt(self, course: StabilisedState, felt: Felt) -> Whereabouts:
+        """Where the feet are: looked up at rest, and at the end of every time on both."""
+        mode, tau, _, side = course.memory[:4].tolist()
+        tips = self.body.tips[::-1] if side > 0.0 else self.body.tips
+        feet, robot, both = course.feet, self.body.robot, float(self.rhythm.both)
+        if feet.north is None:
+            return feet.oriented(robot, felt.attitude, felt.q, tips[0])
+        if mode == STEPPING and course.landed and both < tau <= both + float(self.rhythm.dt):
+            return feet.measured(robot, felt.attitude, felt.q, (tips[0], tips[1]))
+        return feet
+
+    def coming(self, course: StabilisedState, feedback: bool = True) -> Array:
+        """The step in course and the next (2, 3); with feedback they lead back to the footholds."""
+        coming, k = np.zeros((2, 3)), course.landed
+        rows = self.steps[k : k + 2]
+        if feedback and len(rows):
+            side = float(course.memory[3])
+            apart = np.outer([-side, side][: len(rows)], [0.0, 2.0 * float(self.rhythm.apart), 0.0])
+            rows = back_to_plan(course.feet.stance, self.footholds[k : k + 2], rows + apart) - apart
+        coming[: len(rows)] = rows
+        return coming
 
     def inputs(self, course: StabilisedState, felt: Felt, feedback: bool = True) -> dict[str, Array]:
         """What the program takes for a cycle, by name."""
         k = course.landed
         now = min(self.phase(course) + 1, len(self.heights) - 1)
         q = np.where(self._legs, course.q, self.q[now])
-        coming = np.zeros((2, 3))
-        rows = self.steps[k : k + 2]
-        coming[: len(rows)] = rows
         return {
             **self._constant,
             "memory": course.memory,
@@ -111,7 +139,7 @@ class StabilisedWalk:
             "joints": felt.q,
             "force": felt.force,
             "pressure": felt.pressure,
-            "steps": coming,
+            "steps": self.coming(course, feedback),
             "more": np.array([float(len(self.steps) - k - 1)]),
             "height": self.heights[now : now + 1],
             "command": q,
@@ -177,6 +205,8 @@ def stabilised(robot: Robot, trajectory: Trajectory, gains: Gains | None = None)
     body = body_of(robot, right.name, left.name, 1.0)
     swings = swings_of(plan, body.tips)
     rhythm = rhythm_of(plan, body.tips, swings, np.array(right.sole))
+    begin = start_of(plan, body, rhythm, swings)
+    feet = Whereabouts(np.array(begin.stance), np.array(begin.other))
     times = np.arange(plan.time[0], plan.time[-1] + 0.5 * CYCLE, CYCLE)
     waist = plan.base_sampled(times) @ np.linalg.inv(as_array(body.T_waist_base))
     return StabilisedWalk(
@@ -184,11 +214,10 @@ def stabilised(robot: Robot, trajectory: Trajectory, gains: Gains | None = None)
         rhythm=rhythm,
         gains=gains or Gains(),
         steps=steps_of(plan, body.tips, rhythm, swings),
+        footholds=footholds_of(plan, body.tips, swings),
         q=plan.sampled(times)[0],
         heights=waist[:, 2, 3],
-        start=StabilisedState(
-            np.array(row(start_of(plan, body, rhythm, swings))), np.array(plan.q[0]), 0, 0.0
-        ),
+        start=StabilisedState(np.array(row(begin)), np.array(plan.q[0]), 0, 0.0, feet),
     )
 
 
