@@ -1,7 +1,8 @@
 """Where the feet of a walking robot stand, by its joints and its heading, and steps that lead back to a plan.
 
-A foot slips, twists, or lands where a late servo had it and not where it was commanded. Which of it happened is
-seen once both feet stand: joints say where one foot is from the other, and the IMU how far the robot has turned.
+A foot slips, twists, or lands where a late servo had it and not where it was commanded. Which of it happened
+is seen once both feet stand: joints say where one foot is from the other, and the IMU how far the robot has
+turned.
 """
 
 from __future__ import annotations
@@ -41,21 +42,25 @@ class Whereabouts:
 
         Args:
             robot: of the senses.
-            attitude: (3, 3) of its base, with the IMU's heading. q: (n,) measured.
+            attitude: of its base (3, 3), with the IMU's heading.
+            q: measured joint positions (n,).
             tip: of that foot.
         """
+        if not _read(attitude, q):
+            return self
         turn = _heading(attitude @ _foot(robot, q, tip)[:3, :3]) - float(self.stance[2])
-        return replace(self, north=turn) if np.isfinite(turn) else self
+        return replace(self, north=turn)
 
     def measured(self, robot: Robot, attitude: Array, q: Array, tips: tuple[str, str]) -> Whereabouts:
         """Both feet stand: where the newly landed one is, by what was measured.
 
         Args:
             robot: of the senses.
-            attitude: (3, 3) of its base, with the IMU's heading. q: (n,) measured.
+            attitude: of its base (3, 3), with the IMU's heading.
+            q: measured joint positions (n,).
             tips: of the foot that landed last and of the one that stood before.
         """
-        if self.north is None:
+        if self.north is None or not _read(attitude, q):
             return self
         new, old = (_foot(robot, q, tip) for tip in tips)
         c, s = np.cos(self.north), np.sin(self.north)
@@ -64,8 +69,7 @@ class Whereabouts:
         seen = np.array([self.other[0] + c * x + s * y, self.other[1] + c * y - s * x, yaw])
         off = seen - self.stance
         off[2] = _arc(off[2])
-        believed = np.isfinite(off).all() and (np.abs(off) < _STRAY).all()
-        return replace(self, stance=self.stance + off) if believed else self
+        return replace(self, stance=self.stance + off) if (np.abs(off) < _STRAY).all() else self
 
 
 def back_to_plan(place: Array, footholds: Array, steps: Array) -> Array:
@@ -74,7 +78,7 @@ def back_to_plan(place: Array, footholds: Array, steps: Array) -> Array:
     Args:
         place: x, y, yaw (3,) of the foot that stands.
         footholds: (S, 3) places where the plan lands in turn.
-        steps: (S, 3) displacements from foot to foot in the plan, from which these differ by ``BACK`` at most.
+        steps: (S, 3) displacements from foot to foot in the plan; these differ by ``BACK`` at most.
     """
     rows = []
     for goal, step in zip(footholds, steps, strict=True):
@@ -96,6 +100,10 @@ def joined_place(origin: Array, step: Array) -> Array:
     """The place (3,) that is a step (3,) beside another one."""
     c, s = np.cos(origin[2]), np.sin(origin[2])
     return origin + np.array([c * step[0] - s * step[1], s * step[0] + c * step[1], step[2]])
+
+
+def _read(attitude: Array, q: Array) -> bool:
+    return bool(np.isfinite(attitude).all() and np.isfinite(q).all())
 
 
 def _foot(robot: Robot, q: Array, tip: str) -> Array:

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.algebra.se3 import as_array, rotation_exp, vector_from_array
+from screwkin.algebra.se3 import Z, as_array, rotate, rotation_exp, vector_from_array
 from screwkin.dynamics.terrain import Terrain
 from screwkin.gait.rhythm import CYCLE
 from screwkin.gait.stabilised import Felt, StabilisedWalk
@@ -72,13 +72,13 @@ class WalkController:
 class Senses:
     """An IMU on the base, joint positions, and force cells in the feet, with their errors."""
 
-    def __init__(self, robot: Robot, by: Perturbation, feet: tuple[str, str], cells: bool = True) -> None:
-        """Senses of a robot in a world; feet: tips of the right and the left one; cells: feet feel forces."""
+    def __init__(self, robot: Robot, by: Perturbation, feet: tuple[str, str]) -> None:
+        """Senses of a robot in a world; feet: tips of the right and the left one."""
         legs = [limb for limb in robot.limbs if limb.kind == "leg"]
         self._feet = [[leg.tip for leg in legs].index(tip) for tip in feet]
         self._links = {legs[i].link: k for k, i in enumerate(self._feet)}
         self._upright = Terrain(*by.slope).R if any(by.slope) else np.eye(3)
-        self._by, self._cells = by, cells
+        self._by, self._time = by, 0.0
         self._late: list[Felt] = []
         self._draw = np.random.default_rng([by.seed, 2])
 
@@ -87,8 +87,10 @@ class Senses:
         by = self._by
         turn = np.array(by.imu_bias) + by.imu_noise * self._draw.standard_normal(3)
         wrong = as_array(rotation_exp(vector_from_array(turn))) if turn.any() else np.eye(3)
-        attitude = self._upright @ seen.T_world_base[:3, :3] @ wrong
-        force, pressure = self._pressed(seen) if self._cells else (np.ones(2), np.zeros((2, 2)))
+        drift = as_array(rotate(Z, by.imu_rate_bias[2] * self._time))
+        self._time += period
+        attitude = drift @ self._upright @ seen.T_world_base[:3, :3] @ wrong
+        force, pressure = self._pressed(seen) if by.cells else (np.ones(2), np.zeros((2, 2)))
         self._late.append(Felt(attitude, np.array(seen.q), force, pressure))
         ago = round(by.sense_lag / period)
         self._late = self._late[-(ago + 1) :]

@@ -40,8 +40,9 @@ class Perturbation:
     never arrive, each of frame [s]; the servos stay at the one before.
 
     Of the senses: imu_noise [rad] and imu_rate_noise [rad/s]: standard deviations about each axis; imu_bias
-    [rad] and imu_rate_bias [rad/s], about the axes of the base; sense_lag [s]: from what happens to its
-    reading. seed: of what is random in a run.
+    [rad] and imu_rate_bias [rad/s], about the axes of the base, of which what is about the vertical turns the
+    heading more and more; sense_lag [s]: from what happens to its reading; cells: 1 if feet feel forces, 0 if
+    not. seed: of what is random in a run.
     """
 
     mass: Figure = 1.0
@@ -69,6 +70,7 @@ class Perturbation:
     imu_bias: Triple = (0.0, 0.0, 0.0)
     imu_rate_bias: Triple = (0.0, 0.0, 0.0)
     sense_lag: float = 0.0
+    cells: int = 1
     seed: int = 0
 
     def __post_init__(self) -> None:
@@ -157,6 +159,7 @@ _BOUNDS: Mapping[str, tuple[float, float]] = {
     "imu_bias": (-1.0, 1.0),
     "imu_rate_bias": (-100.0, 100.0),
     "sense_lag": (0.0, 1.0),
+    "cells": (0, 1),
     "seed": (0, 2**63),
 }
 """Least and greatest value of every number; where a key has several numbers, of each."""
@@ -185,9 +188,9 @@ def perturbation_faults(values: Mapping[str, Any]) -> Iterator[Fault]:
         elif isinstance(value, Mapping) and key in BY_NAME:
             numbers = value.values()
         if not all(_is_number(x) and least <= x <= most for x in numbers):
-            fix = f"Give {'whole ' * (key == 'seed')}numbers from {least:g} to {most:g}"
+            fix = f"Give {'whole ' * (key in WHOLE)}numbers from {least:g} to {most:g}"
             yield Fault(PLACE, key, f"{value!r} is out of range", fix)
-        elif key == "seed" and not isinstance(value, int):
+        elif key in WHOLE and not isinstance(value, int):
             yield Fault(PLACE, key, f"{value!r} is no whole number", "Give a whole number")
 
 
@@ -199,6 +202,8 @@ PLACE = "[perturbation]"
 """Where the keys stand in a file."""
 BY_NAME = ("mass", "lag", "stiffness", "backlash", "torque")
 """Keys that may hold numbers by the names of links (mass) or joints."""
+WHOLE = ("cells", "seed")
+"""Keys of whole numbers."""
 DEFAULTS: Mapping[str, Any] = MappingProxyType({f.name: f.default for f in fields(Perturbation)})
 """What every key is where nothing differs from the plan."""
 NONE = Perturbation()

@@ -9,7 +9,7 @@ from typing import Any
 from screwkin.errors import Fault, InputError, PerturbationError
 from screwkin.model.expression import ExpressionError, evaluate
 from screwkin.model.toml import read_text, read_toml
-from screwkin.sim.perturbation import BY_NAME, DEFAULTS, PLACE, Perturbation, perturbation_faults
+from screwkin.sim.perturbation import BY_NAME, DEFAULTS, PLACE, WHOLE, Perturbation, perturbation_faults
 
 
 def load_perturbation(path: str | Path) -> Perturbation:
@@ -90,7 +90,7 @@ def _number(key: str, value: Any, faults: list[Fault]) -> Any:
     except ExpressionError as error:
         faults.append(Fault(PLACE, key, error.found, error.fix))
         return 0.0
-    return int(number) if key == "seed" and float(number).is_integer() else number
+    return int(number) if key in WHOLE and float(number).is_integer() else number
 
 
 def described(perturbation: Perturbation) -> Iterator[str]:
