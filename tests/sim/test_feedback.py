@@ -1,0 +1,88 @@
+"""What a robot feels of a simulation: an observation as it is, then each error of its senses by itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import screwkin as sk
+from screwkin.algebra.se3 import X, Z, as_array, rotate
+from screwkin.errors import InputError
+from screwkin.model.robot import Robot
+from screwkin.sim.backend import Contact, Observation
+from screwkin.sim.feedback import Senses
+from screwkin.sim.perturbation import NONE, Perturbation
+from screwkin.sim.perturbation_files import perturbation_from_texts
+
+FEET = ("right_foot", "left_foot")
+PERIOD = 0.01
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return sk.load_robot("bioloid")
+
+
+def standing(robot: Robot, turn: float = 0.0, contacts: tuple[Contact, ...] = ()) -> Observation:
+    """Turned about the vertical, feet where the legs at home have them."""
+    q = np.array(sk.home(robot).q)
+    base = np.eye(4)
+    base[:3, :3] = as_array(rotate(Z, turn))
+    feet = np.array([sk.frame_pose(robot, sk.State(base, q), tip) for tip in FEET])
+    still = np.zeros(len(q))
+    return Observation(0.0, base, q, still, still, feet, np.zeros((2, 6)), contacts)
+
+
+@given(turn=st.floats(-3.0, 3.0), part=st.floats(0.0, 1.0), at=st.floats(-0.02, 0.02))
+def test_feet_feel_how_hard_and_where_the_floor_presses(turn: float, part: float, at: float) -> None:
+    """Two forces along the floor's normal under a foot: their sum, and the point that divides them."""
+    robot = sk.load_robot("bioloid")
+    seen = standing(robot, turn)
+    link = robot.limb("left_foot").link
+    points = [seen.T_world_foot[1] @ [x, 0.01, 0.0, 1.0] for x in (at, at + 0.01)]
+    forces = (4.0 * part, 4.0 - 4.0 * part)
+    contacts = tuple(
+        Contact(link, tuple(p[:3].tolist()), (0.3, 0.0, f)) for p, f in zip(points, forces, strict=True)
+    )
+    felt = Senses(robot, NONE, FEET).feel(replace(seen, contacts=contacts), PERIOD)
+    assert felt.force == pytest.approx([0.0, 4.0])
+    assert felt.pressure[1] == pytest.approx([at + 0.01 * (1.0 - part), 0.01], abs=1e-9)
+    np.testing.assert_allclose(felt.attitude, as_array(rotate(Z, turn)), atol=1e-12)
+    assert (felt.q == seen.q).all()
+
+
+def test_feet_without_cells_feel_nothing_of_the_floor(robot: Robot) -> None:
+    contacts = (Contact(robot.limb("left_foot").link, (0.0, 0.0, 0.0), (0.0, 0.0, 5.0)),)
+    felt = Senses(robot, Perturbation(cells=0), FEET).feel(standing(robot, contacts=contacts), PERIOD)
+    assert (felt.force == 1.0).all()
+    assert (felt.pressure == 0.0).all()
+    assert perturbation_from_texts(["cells=0"]) == Perturbation(cells=0)
+    with pytest.raises(InputError, match="whole numbers from 0 to 1"):
+        Perturbation(cells=2)
+
+
+def test_a_heading_drifts_and_gravity_does_not(robot: Robot) -> None:
+    """A rate's bias about the vertical turns the heading as time passes; a lean stays what it is."""
+    senses = Senses(robot, Perturbation(imu_rate_bias=(0.3, 0.2, 0.1)), FEET)
+    seen = standing(robot)
+    leaning = replace(
+        seen, T_world_base=np.block([[as_array(rotate(X, 0.2)), np.zeros((3, 1))], [0, 0, 0, 1]])
+    )
+    felt = [senses.feel(leaning, PERIOD).attitude for _ in range(50)]
+    np.testing.assert_allclose(felt[-1], as_array(rotate(Z, 0.1 * 49 * PERIOD) @ rotate(X, 0.2)), atol=1e-12)
+
+
+def test_noise_has_its_deviation_a_bias_stays_and_a_late_sense_is_of_before(robot: Robot) -> None:
+    seen = standing(robot)
+    noisy = Senses(robot, Perturbation(imu_noise=0.01, imu_bias=(0.05, 0.0, 0.0), seed=4), FEET)
+    about = np.array([noisy.feel(seen, PERIOD).attitude for _ in range(400)])
+    roll = np.arctan2(about[:, 2, 1], about[:, 2, 2])
+    assert roll.mean() == pytest.approx(0.05, abs=4 * 0.01 / 20)
+    assert roll.std() == pytest.approx(0.01, rel=0.2)
+    late = Senses(robot, Perturbation(sense_lag=0.02), FEET)
+    felt = [late.feel(replace(seen, q=seen.q + k), PERIOD).q[0] - seen.q[0] for k in range(6)]
+    assert felt == [0.0, 0.0, 0.0, 1.0, 2.0, 3.0]
