@@ -11,6 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
+from screwkin.analysis import engines
 from screwkin.analysis.campaign import (
     OFF,
     ON,
@@ -29,7 +30,7 @@ from screwkin.analysis.campaign_sheet import finished_rows, rows_arrays, rows_cs
 from screwkin.analysis.campaign_statistics import Paired, Tally, comparisons, tallies, tally
 from screwkin.analysis.campaign_store import Journal, journal
 from screwkin.analysis.campaign_world import AS_PLANNED, check_world
-from screwkin.analysis.engines import RIGID, SimulatedCompliance
+from screwkin.analysis.engines import SimulatedCompliance
 from screwkin.analysis.verdict import VERSIONED
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, FittingGait, GaitName, OutputFolder, RobotName, settings
@@ -81,7 +82,9 @@ def sweep(
         ),
     ] = None,
     engine: Annotated[str | None, typer.Option(help="As of validate; default: auto.")] = None,
-    servo: Annotated[str, typer.Option(help="As of validate: rigid, table, or a servo model.")] = RIGID,
+    servo: Annotated[
+        str, typer.Option(help="As of validate, with its default: auto, table, rigid or a servo model.")
+    ] = engines.AUTO,
     feedback: Annotated[
         bool, typer.Option("--feedback", help="As of validate; --set feedback=off,on compares both.")
     ] = False,
@@ -193,7 +196,8 @@ def _campaign(robot: Robot, axes: Axes, seeds: tuple[int, ...]) -> Campaign:
     for name in axes["engine"]:
         engine_named(name)
     for name in axes["servo"]:
-        SimulatedCompliance().on(name).motors_of(robot)
+        if name != engines.AUTO:
+            SimulatedCompliance().on(name).motors_of(robot)
     for text in axes["feedback"]:
         one_of("feedback", text, (OFF, ON))
     for text in axes["perturb"]:

@@ -21,6 +21,7 @@ def test_a_campaign_leaves_its_rows_and_what_has_ended_is_not_played_again(cli, 
     assert (data["rows"], data["falls"], data["interval"]) == (6, 0, None)
     assert (data["planned"], data["refused"], data["crashed"]) == (6, 0, 0)
     assert [setting["values"]["Tc"] for setting in data["settings"]] == ["1", "1.2"]
+    assert json.loads((folder / "campaign.json").read_text())["axes"]["servo"] == ["auto"]  # as of validate
     names = {"campaign.json", "rows.jsonl", "rows.csv", "rows.npz", "settings.csv", "falls.png"}
     assert {path.name for path in folder.iterdir()} == names
     with (folder / "rows.csv").open(newline="") as file:
