@@ -17,7 +17,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.analysis.campaign import Campaign, CampaignRow
 from screwkin.analysis.campaign_outcome import Outcome
 from screwkin.analysis.campaign_statistics import tally
-from screwkin.errors import InputError, NoSolutionError
+from screwkin.errors import InputError, NoSolutionError, one_of
 
 OBJECTIVES = ("margin", "falls")
 MEMBERS = 6
@@ -120,8 +120,7 @@ def check_search(search: Search) -> None:
     several = [key for key, values in search.campaign.axes.items() if len(values) > 1]
     if several:
         raise InputError(f"--optimise takes bounds, --set {several[0]}=LEAST:GREATEST, not several values")
-    if search.objective not in OBJECTIVES:
-        raise InputError(f"--optimise {search.objective}: valid: {', '.join(OBJECTIVES)}")
+    one_of("--optimise", search.objective, OBJECTIVES)
     if not search.bounds:
         raise InputError("--optimise needs bounds of one parameter at least; write --set KEY=LEAST:GREATEST")
     for key, (least, most) in search.bounds.items():

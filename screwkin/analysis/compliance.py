@@ -17,7 +17,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.compliance.springs import StiffnessChoice
-from screwkin.errors import InputError
+from screwkin.errors import InputError, one_of
 from screwkin.gait.compensation import WAYS, compensate_walk, way_of
 from screwkin.gait.ground import ground_of
 from screwkin.model.robot import Robot
@@ -124,10 +124,10 @@ def compliance_study(
     """
     if "compensation" in trajectory.meta:
         raise InputError("the trajectory is compensated already; give the walk as it was planned")
-    unknown = [name for name in treatments if name not in TREATMENTS]
-    if unknown or not treatments:
-        fault = f"unknown treatment {unknown[0]!r}" if unknown else "no treatment"
-        raise InputError(f"{fault}; valid: {', '.join(TREATMENTS)}")
+    for name in treatments:
+        one_of("treatment", name, TREATMENTS)
+    if not treatments:
+        raise InputError(f"no treatment; valid: {', '.join(TREATMENTS)}")
     trials: list[Trial] = []
     for done, treatment in enumerate(treatments):
         commanded = trajectory

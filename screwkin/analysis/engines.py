@@ -85,7 +85,12 @@ class SimulatedCompliance:
         """The motor of every joint, none if servos are rigid or springs."""
         if self.motors is None:
             return ()
-        return motors_of(robot) if self.motors == TABLE else motors_named(robot, self.motors)
+        if self.motors == TABLE:
+            return motors_of(robot)
+        try:
+            return motors_named(robot, self.motors)
+        except UnknownNameError as error:
+            raise UnknownNameError("servo", error.name, (AUTO, RIGID, TABLE, *error.valid)) from None
 
     def commands(self, robot: Robot, trajectory: Trajectory) -> Trajectory:
         """What the servos are sent: on motors, a plan with the torque term, so that they follow it.

@@ -13,7 +13,7 @@ from importlib import import_module
 from io import TextIOWrapper
 from typing import Any, NoReturn
 
-from screwkin.errors import InputError, ScrewkinError, missing_library, one_of
+from screwkin.errors import InputError, ScrewkinError, missing_library, near, one_of
 
 VERBS = {
     "demo": "A robot walks: table, mechanism, gait, ZMP, simulation, and a report with pictures.",
@@ -48,7 +48,19 @@ APP: Mapping[str, Any] = {
 }
 """How typer is set up, here and by the verbs that are groups of verbs."""
 
+COMPLETION = "_SCREWKIN_COMPLETE"
+"""The variable by which a shell asks for completions, instead of running a verb."""
 _INTERRUPTED = 130
+
+OPTIONS = {
+    "--help": "Show this message; screwkin VERB --help explains a verb.",
+    "--version": "Show the version.",
+    "--install-completion": "Let the shell complete verbs, names and options: bash, zsh, fish, PowerShell.",
+    "--show-completion": "Show the script that does so.",
+    "--quiet": "With any verb: no results, remarks or bars; files, --json, errors and exit code stay.",
+    "--no-color": "With any verb: no colours; so does the variable NO_COLOR.",
+    "--debug": "With any verb: show the traceback of an error.",
+}
 
 _USAGE = """\
 Usage: screwkin VERB [ARGUMENTS] [OPTIONS]
@@ -59,12 +71,9 @@ Verbs:
 {verbs}
 
 Options:
-  --help     Show this message; screwkin VERB --help explains a verb.
-  --version  Show the version.
-  --debug    With any verb: show the traceback of an error.
+{options}
 
-Begin with: screwkin demo
-"""
+Begin with: screwkin demo"""
 
 
 def main(argv: Sequence[str] | None = None) -> NoReturn:
@@ -77,8 +86,15 @@ def main(argv: Sequence[str] | None = None) -> NoReturn:
 
 def run(argv: Sequence[str]) -> int:
     """Run the command line and return its exit code: every error ends as one message on stderr."""
+    from screwkin.cli.terminal import with_manners
+
     words = [word for word in argv if word != "--debug"]
     debug = len(words) < len(argv) or bool(os.environ.get("SCREWKIN_DEBUG"))
+    with with_manners(words) as words:
+        return _run(words, debug)
+
+
+def _run(words: Sequence[str], debug: bool) -> int:
     try:
         code = _dispatch(words)
         sys.stdout.flush()
@@ -100,21 +116,28 @@ def run(argv: Sequence[str]) -> int:
 
 def _dispatch(words: Sequence[str]) -> int:
     """Call the verb of a command line."""
+    if COMPLETION in os.environ:
+        from screwkin.cli.completion import answer
+
+        return answer()
     name = words[0] if words else "--help"
     if name in ("--help", "-h", "help"):
-        width = max(map(len, VERBS))
-        print(
-            _USAGE.format(verbs="\n".join(f"  {verb:{width}}  {text}" for verb, text in VERBS.items())),
-            end="",
-        )
+        from screwkin.cli.output import aligned, say
+
+        say(_USAGE.format(verbs=aligned([*VERBS.items()], "  "), options=aligned([*OPTIONS.items()], "  ")))
         return 0
     if name == "--version":
         from screwkin import __version__
 
         print(f"screwkin {__version__}")
         return 0
+    if name in ("--install-completion", "--show-completion"):
+        from screwkin.cli.completion import script
+
+        return script(name == "--install-completion", *words[1:2])
     if name.startswith("-"):
-        raise InputError(f"unknown option {name}; screwkin --help lists the options and verbs")
+        question = near(name, OPTIONS)
+        raise InputError(f"unknown option {name}. {question}screwkin --help lists the options and verbs")
     one_of("verb", name, VERBS)
     import typer
 
@@ -143,6 +166,15 @@ def verb_app(name: str) -> Any:
     return app
 
 
+def _meant(error: Any) -> str:
+    """What typer says of an option that does not exist, and the nearest one; empty for other errors."""
+    option, command = getattr(error, "option_name", None), getattr(error.ctx, "command", None)
+    if option is None or command is None or not hasattr(error, "possibilities"):
+        return ""
+    names = [name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts)]
+    return f"{error.message}. {near(option, [*names, *OPTIONS])}".rstrip()
+
+
 def _report(error: Exception, words: Sequence[str], debug: bool) -> int:
     """Print an error as one message, with ``--json`` also as an object on stdout; returns its exit code."""
     if isinstance(error, ModuleNotFoundError) and not str(error.name).startswith("screwkin"):
@@ -150,10 +182,12 @@ def _report(error: Exception, words: Sequence[str], debug: bool) -> int:
     if isinstance(error, ScrewkinError):
         code, message = error.exit_code, str(error)
     elif hasattr(error, "format_message"):  # typer's own: an unknown option, a missing argument
-        code, message = 2, f"{error.format_message()} (screwkin {words[0]} --help)"
+        code, message = 2, f"{_meant(error) or error.format_message()} (screwkin {words[0]} --help)"
     else:
         code, message = 1, f"unexpected {type(error).__name__}: {error}"
-    print(f"error: {message}", file=sys.stderr)
+    from screwkin.cli.terminal import folded
+
+    print(folded(f"error: {message}", sys.stderr), file=sys.stderr)
     if code == 1 and not debug:
         print(f"For the traceback: screwkin {' '.join(words)} --debug", file=sys.stderr)
     if "--json" in words:

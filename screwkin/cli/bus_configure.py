@@ -12,7 +12,7 @@ import typer
 from screwkin.cli.bus_talk import Port, Rs485, opened_bus
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, RobotName
-from screwkin.cli.output import print_json, remark
+from screwkin.cli.output import print_json, remark, say
 from screwkin.errors import NoSolutionError
 from screwkin.files import atomic_write
 from screwkin.model.robot import Robot
@@ -123,7 +123,7 @@ def _print_dry(apart: Sequence[str], left: Sequence[str], as_json: bool) -> int:
     if as_json:
         print_json({"written": [], "differences": apart, "left": left, "backup": None})
     else:
-        print("\n".join(apart) if apart else "every servo holds what the table wants")
+        say("\n".join(apart) if apart else "every servo holds what the table wants")
         if apart:
             remark("A dry run: nothing was written. To write: --go.")
     return 3 if left else 0
@@ -134,7 +134,7 @@ def _print_written(changes: Sequence[Change], left: Sequence[str], file: str, as
         data: dict[str, Any] = {"written": [one.to_dict() for one in changes], "left": left}
         print_json(data | {"differences": left, "backup": file or None})
     else:
-        print("\n".join(map(str, changes)) if changes else "nothing had to be written")
+        say("\n".join(map(str, changes)) if changes else "nothing had to be written")
         for line in left:
-            print(line)
+            say(line)
     return 3 if left else 0

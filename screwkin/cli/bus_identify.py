@@ -12,8 +12,8 @@ import typer
 
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder
-from screwkin.cli.output import aligned, print_json, progress_bar, remark
-from screwkin.errors import InputError
+from screwkin.cli.output import aligned, print_json, progress_bar, remark, say
+from screwkin.errors import InputError, one_of
 from screwkin.files import atomic_write
 from screwkin.model.table import load_robot
 from screwkin.motors.bench import BenchLog, load_bench_log
@@ -48,9 +48,7 @@ def bus_identify(
     held = list(hold_back) if hold_back else [path for i, path in enumerate(logs) if _is_held(i, len(logs))]
     fitted = [read[path] for path in logs if path not in held]
     start = load_motor(model or _model([log.model for log in read.values()]))
-    chosen = next((known for known in FRICTIONS if known == friction), None)
-    if chosen is None:
-        raise InputError(f"--friction {friction!r} is unknown; expected one of {', '.join(FRICTIONS)}")
+    chosen = one_of("--friction", friction, tuple(FRICTIONS))
     with progress_bar("identification") as done:
         found = identify(start, fitted, [read[path] for path in held], chosen, done)
     with output_folder(output, "identify", found.model.model) as folder:
@@ -106,15 +104,13 @@ def _print(found: Identification, path: Path, as_json: bool) -> None:
             }
         )
         return
-    print(
-        f"{found.model.model}, friction {found.friction}: mean absolute position error from the goals alone"
-    )
+    say(f"{found.model.model}, friction {found.friction}: mean absolute position error from the goals alone")
     rows = [(name, f"{error:.4f} rad", "fitted") for name, error in found.fitted.items()]
     rows += [(name, f"{error:.4f} rad", "held back") for name, error in found.held_back.items()]
-    print(aligned(rows, "  "))
-    print(f"mean {fitted:.4f} rad fitted" + ("" if held is None else f", {held:.4f} rad held back"))
+    say(aligned(rows, "  "))
+    say(f"mean {fitted:.4f} rad fitted" + ("" if held is None else f", {held:.4f} rad held back"))
     figures = {**motor, **asdict(found.model.motor.friction)}
-    print(aligned([(name, f"{value:.6g}") for name, value in figures.items() if value], "  "))
-    print(f"written to {path}")
+    say(aligned([(name, f"{value:.6g}") for name, value in figures.items() if value], "  "))
+    say(f"written to {path}")
     if held is None:
         remark("Nothing was held back: give more logs, or --hold-back, to see how well it predicts.")

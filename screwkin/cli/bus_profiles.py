@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from screwkin.cli.options import AsJson
-from screwkin.cli.output import aligned, print_json
+from screwkin.cli.output import aligned, print_json, say
 from screwkin.motors.library import has_motor
 from screwkin.servo.profiles import Profile, Register, load_profile, profile_models
 
@@ -34,10 +34,10 @@ def bus_profiles(
         print_json({"models": rows})
         return 0
     titles = ("model", "protocol", "number", "ticks", "degrees", "N m", "rpm", "V", "reads", "table")
-    print(aligned([titles, *(_row(profile) for _, profile in profiles)], "  "))
+    say(aligned([titles, *(_row(profile) for _, profile in profiles)], "  "))
     if model:
-        print(f"table: {profiles[0][1].source}\nfigures: {profiles[0][1].sheet}")
-        print(aligned([_REGISTER, *map(_register, profiles[0][1].registers.values())], "  "))
+        say(f"table: {profiles[0][1].source}\nfigures: {profiles[0][1].sheet}")
+        say(aligned([_REGISTER, *map(_register, profiles[0][1].registers.values())], "  "))
     return 0
 
 

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from screwkin.cli.options import AsJson
-from screwkin.cli.output import aligned, print_json, progress_bar, remark
+from screwkin.cli.output import aligned, print_json, progress_bar, remark, say
 from screwkin.errors import InputError
 from screwkin.files import atomic_write
 from screwkin.model.robot import Robot
@@ -80,11 +80,11 @@ def bus_scan(
         print_json({"servos": rows, "differences": wrong, "registers": details, "round_trip": times})
     else:
         cells = [(f.id, f.name, f"protocol {f.protocol}", f"{f.baud} baud", _version(f)) for f in answering]
-        print(aligned(cells, "  ") if cells else "no servo answers; are power and port right?")
+        say(aligned(cells, "  ") if cells else "no servo answers; are power and port right?")
         for line in wrong:
-            print(line)
+            say(line)
         if trip:
-            print(f"an answer takes {trip}")
+            say(f"an answer takes {trip}")
     if trip and trip.is_slow:
         remark(f"That is slow: {latency_advice(port)}.")
     for line in old_firmware(answering):
@@ -149,8 +149,8 @@ def bus_read(
     if as_json:
         print_json({"values": data})
     else:
-        print(title)
-        print(aligned([(name, f"{value:.6g}") for name, value in data.items()], "  "))
+        say(title)
+        say(aligned([(name, f"{value:.6g}") for name, value in data.items()], "  "))
     return 0
 
 
@@ -179,8 +179,8 @@ def bus_calibrate(
     if as_json:
         print_json({"zero": zero, "flipped": list(flip or ()), "table": str(write)})
     else:
-        print(aligned([(joint, f"{value:+.4f} rad") for joint, value in zero.items()], "  "))
-        print(f"written to {write}")
+        say(aligned([(joint, f"{value:+.4f} rad") for joint, value in zero.items()], "  "))
+        say(f"written to {write}")
         remark("Walks planned with the old table are refused now: plan and validate them again.")
     return 0
 

@@ -13,7 +13,7 @@ import typer
 
 from screwkin.cli.injected import Faults, FormerFaults, Seed, injected_faults
 from screwkin.cli.options import AsJson, RobotName
-from screwkin.cli.output import print_json, remark, silent
+from screwkin.cli.output import print_json, remark, say, silent
 from screwkin.errors import InputError, OutputError
 from screwkin.model.table import load_robot
 from screwkin.servo.line import MonotonicClock
@@ -55,7 +55,7 @@ def virtual(
         if as_json:
             print_json({**facts, "baud": mapped.baud, "ids": mapped.ids})
         else:
-            print(f"{len(servos)} virtual servos of {table.name} at {port}, {mapped.baud} baud", flush=True)
+            say(f"{len(servos)} virtual servos of {table.name} at {port}, {mapped.baud} baud")
         (silent if as_json else remark)("End with Ctrl-C." if seconds is None else f"Ends in {seconds:g} s.")
         _wait(terminal, None if seconds is None else start + seconds)
     remark(f"{bus.packets} packets, {bus.answers} answers")

@@ -8,7 +8,7 @@ from screwkin.analysis.audit import added_by_pybullet, audit
 from screwkin.analysis.remark import LEVELS, Remark
 from screwkin.anatomy.humanoid import anatomy
 from screwkin.cli.options import AsJson, RobotName
-from screwkin.cli.output import print_json
+from screwkin.cli.output import print_json, say
 from screwkin.errors import ScrewkinError, TableError
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
@@ -32,8 +32,8 @@ def check(robot: RobotName, as_json: AsJson = False) -> int:
         print_json({"robot": table.name, "remarks": found, "counts": counts, "passed": not counts["error"]})
     else:
         for remark in remarks:
-            print(remark)
-        print(f"{table.name}: " + ", ".join(f"{count} of level {level}" for level, count in counts.items()))
+            say(str(remark))
+        say(f"{table.name}: " + ", ".join(f"{count} of level {level}" for level, count in counts.items()))
     return _NO if counts["error"] else 0
 
 

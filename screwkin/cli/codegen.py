@@ -8,7 +8,7 @@ import typer
 
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, RobotName
-from screwkin.cli.output import print_json
+from screwkin.cli.output import print_json, say
 from screwkin.export.codegen import KINDS, c_files, programs_of
 from screwkin.files import atomic_write
 from screwkin.model.table import load_robot
@@ -36,6 +36,6 @@ def codegen(
         print_json({"robot": loaded.name, "files": list(files), "operations": counts})
     else:
         for name, count in counts.items():
-            print(f"{name}: {count} operations a sample")
-        print(f"files in {folder}: {', '.join(files)}")
+            say(f"{name}: {count} operations a sample")
+        say(f"files in {folder}: {', '.join(files)}")
     return 0

@@ -11,7 +11,7 @@ import typer
 from screwkin.analysis.compare import Comparison, compare_models
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, RobotName
-from screwkin.cli.output import aligned, drawn, print_json, remark
+from screwkin.cli.output import aligned, drawn, print_json, remark, say
 from screwkin.files import atomic_write
 from screwkin.model.dh_csv import dh_text
 from screwkin.model.table import load_robot
@@ -46,8 +46,8 @@ def compare(
     if as_json:
         print_json({**comparison.to_dict(), "folder": str(folder)})
     else:
-        print(_text(comparison))
-        print(f"files in {folder}: {', '.join(path.name for path in files)}")
+        say(_text(comparison))
+        say(f"files in {folder}: {', '.join(path.name for path in files)}")
     agree = max(comparison.fk_max_abs, comparison.jacobian_max_abs) <= 1e-9
     if not agree:
         remark("the DH tables do not describe this robot")

@@ -10,7 +10,7 @@ import typer
 
 from screwkin.analysis.chains import derived_tables
 from screwkin.cli.options import AsJson
-from screwkin.cli.output import print_json, remark, shortened
+from screwkin.cli.output import print_json, remark, say, shortened
 from screwkin.errors import InputError, TableError, one_of
 from screwkin.files import atomic_write
 from screwkin.model.coupled import coupling_text
@@ -76,7 +76,7 @@ def convert(
         data = {"robot": robot.name, "file": str(target), "joints": robot.joint_names, "remarks": remarks}
         print_json(data)
     else:
-        print(f"{target}: {robot.name}, {len(robot.links)} links, {len(robot.joints)} joints")
+        say(f"{target}: {robot.name}, {len(robot.links)} links, {len(robot.joints)} joints")
         for text in remarks:
             remark(shortened(f"remark: {text}"))
     return 0

@@ -15,7 +15,7 @@ from screwkin.analysis.readiness import ready
 from screwkin.analysis.validate import Validation
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder
-from screwkin.cli.output import aligned, print_json, remark, silent
+from screwkin.cli.output import aligned, print_json, remark, say, silent
 from screwkin.cli.playing import played
 from screwkin.cli.send import virtual_bus
 from screwkin.cli.simulation import Wish, simulate_to_files
@@ -52,7 +52,7 @@ def demo(
     Takes well under a minute: the servos are virtual, in simulated time. Exit code 3 if the robot does not
     walk as planned.
     """
-    show = _say if not as_json else remark if sys.stderr.isatty() else silent
+    show = say if not as_json else remark if sys.stderr.isatty() else silent
     name = robot or robot_names()[0]
     table = load_robot(name)
     gait = gait or default_gait(table.name)
@@ -110,10 +110,6 @@ def demo(
             }
         )
     return 0 if check.passed else 3
-
-
-def _say(text: str) -> None:
-    print(text, flush=True)
 
 
 def _show_robot(show: Show, robot: Robot) -> None:

@@ -16,7 +16,7 @@ import typer
 from screwkin import __version__
 from screwkin.cache import cache_folder
 from screwkin.cli.options import AsJson
-from screwkin.cli.output import aligned, print_json
+from screwkin.cli.output import aligned, print_json, say
 from screwkin.compiler.native import compiler
 
 LIBRARIES: Mapping[str, str] = {
@@ -36,13 +36,22 @@ LIBRARIES: Mapping[str, str] = {
     "dask": "sweeps on a cluster (extra: cluster)",
 }
 """Distributions that screwkin uses, and what for."""
+QUESTIONS: Mapping[str, str] = {
+    "What did you do?": "The command line or the Python, whole; the robot's file, if it may be shown.",
+    "What happened?": "The message, with `--debug` its traceback; `validation.json` for a verdict.",
+    "What did you expect, and why?": "A figure from another program, a page of the site, a measurement.",
+    "Does it happen with a bundled robot?": "`screwkin robots` lists them.",
+    "Was real hardware involved?": "Servo models, adapter, and the log of the play.",
+}
+"""What a report of an issue answers, and how."""
 PORTS = ("/dev/ttyUSB*", "/dev/ttyACM*", "/dev/tty.usb*")
 """Where serial adapters for servos are."""
 
 
 def doctor(
     report: Annotated[
-        bool, typer.Option("--report", help="As Markdown, to be pasted into a report of an issue.")
+        bool,
+        typer.Option("--report", help="A report of an issue to fill in, with this computer, as Markdown."),
     ] = False,
     as_json: AsJson = False,
 ) -> int:
@@ -55,9 +64,10 @@ def doctor(
         print_json(facts)
     else:
         rows = _rows(facts)
-        print(_markdown(rows) if report else aligned(rows))
-        for text in facts["advice"]:
-            print(f"- {text}" if report else f"  {text}")
+        if report:
+            print(_report(rows, facts["advice"]))
+        else:
+            say("\n".join([aligned(rows), *(f"  {text}" for text in facts["advice"])]))
     return 0 if facts["ready"] else 3
 
 
@@ -118,6 +128,10 @@ def _rows(facts: Mapping[str, Any]) -> list[tuple[str, str, str]]:
     ]
 
 
-def _markdown(rows: list[tuple[str, str, str]]) -> str:
-    lines = ["| what | here | for |", "|---|---|---|"]
-    return "\n".join([*lines, *(f"| {' | '.join(cell.replace('|', '/') for cell in row)} |" for row in rows)])
+def _report(rows: list[tuple[str, str, str]], advice: list[str]) -> str:
+    """Questions to answer, then what is here, as Markdown."""
+    asked = [f"## {question}\n\n{hint}\n" for question, hint in QUESTIONS.items()]
+    cells = (" | ".join(cell.replace("|", "/") for cell in row) for row in rows)
+    here = ["| what | here | for |", "|---|---|---|", *(f"| {row} |" for row in cells)]
+    todo = ["", *(f"- {text}" for text in advice)] if advice else []
+    return "\n".join([*asked, "## This computer\n", *here, *todo])

@@ -13,7 +13,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.cli.forces_along import FRICTION, VALIDATED, ForceSettings, forces_along
 from screwkin.cli.loads import LOAD_HELP, first_posture, loads_of
 from screwkin.cli.options import AsJson, OutputFolder, assignments, numbers_of
-from screwkin.cli.output import aligned, print_json
+from screwkin.cli.output import aligned, print_json, say
 from screwkin.errors import InputError
 from screwkin.mechanism.action_choice import ActionChoice, action_choice
 from screwkin.mechanism.choice import closed_mechanism
@@ -131,7 +131,7 @@ def _statics(
     if as_json:
         print_json(_data(robot, result, choice))
     else:
-        print(_text(robot, result, choice))
+        say(_text(robot, result, choice))
     return 0
 
 
@@ -148,10 +148,8 @@ def _closed_form(robot: Robot, load: Sequence[str], active: Sequence[str] | None
         print_json({"robot": robot.name, "load": name, "efforts": lines})
         return 0
     where = ", ".join(f"{symbol} of {joint}" for joint, symbol in solution.symbols.items())
-    print(
-        f"{robot.name}: efforts that balance load, an effort at {name}\n{aligned(list(lines.items()), '  ')}"
-    )
-    print(f"  positions: {where}")
+    say(f"{robot.name}: efforts that balance load, an effort at {name}\n{aligned(list(lines.items()), '  ')}")
+    say(f"  positions: {where}")
     return 0
 
 

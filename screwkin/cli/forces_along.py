@@ -13,7 +13,7 @@ from screwkin.analysis.account import account_of, recorded_robot
 from screwkin.analysis.contact_account import ForceAccount, forces_of, simulated_forces, validated_with
 from screwkin.analysis.engines import RIGID
 from screwkin.cli.folder import output_folder
-from screwkin.cli.output import aligned, drawn, print_json, progress_bar
+from screwkin.cli.output import aligned, drawn, print_json, progress_bar, say
 from screwkin.cli.simulation import engine as engine_named
 from screwkin.errors import InputError
 from screwkin.files import atomic_write_bytes, npz_bytes
@@ -66,9 +66,9 @@ def forces_along(path: Path, wanted: ForceSettings) -> int:
     if wanted.as_json:
         print_json(data)
     else:
-        print(f"{path}: {account.robot.name}, {trajectory.samples} samples, {trajectory.duration:.2f} s")
-        print(aligned(_rows(forces, data), "  "))
-        print(f"files in {folder}")
+        say(f"{path}: {account.robot.name}, {trajectory.samples} samples, {trajectory.duration:.2f} s")
+        say(aligned(_rows(forces, data), "  "))
+        say(f"files in {folder}")
     return 0
 
 

@@ -10,7 +10,7 @@ import typer
 
 from screwkin.analysis.ik_study import PAPER_TABLE_5, IkRow, ik_study
 from screwkin.cli.options import AsJson, RobotName
-from screwkin.cli.output import aligned, print_json, progress_bar
+from screwkin.cli.output import aligned, print_json, progress_bar, say
 from screwkin.model.table import load_robot
 
 HEAD = ("method", "iterations: mean", "max", "solved", "in limits", "us each", "settings")
@@ -42,15 +42,15 @@ def ik(
         content = {"rows": [asdict(row) for row in study.rows], "notes": study.notes, "paper": paper}
         print_json({"robot": study.robot, "limb": study.limb, **content})
         return 0
-    print(f"{study.robot}, {study.limb}: inverse kinematics")
+    say(f"{study.robot}, {study.limb}: inverse kinematics")
     for data in dict.fromkeys(row.data for row in study.rows):
         rows = [row for row in study.rows if row.data == data]
-        print(f"{TITLES[data]}, {rows[0].samples} points")
-        print(aligned([HEAD, *(_cells(row, rows[0].samples) for row in rows)], "  "))
-    print("paper B, Table 5, its own leg and walk")
+        say(f"{TITLES[data]}, {rows[0].samples} points")
+        say(aligned([HEAD, *(_cells(row, rows[0].samples) for row in rows)], "  "))
+    say("paper B, Table 5, its own leg and walk")
     printed = [(name, str(count), f"{ms:g} ms") for name, (count, ms) in PAPER_TABLE_5.items()]
-    print(aligned([("method", "iterations", "time"), *printed], "  "))
-    print("\n".join(study.notes))
+    say(aligned([("method", "iterations", "time"), *printed], "  "))
+    say("\n".join(study.notes))
     return 0
 
 

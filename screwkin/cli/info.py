@@ -12,7 +12,7 @@ from screwkin.analysis.facts import Facts, facts_of
 from screwkin.analysis.ik_class import IkClass, ik_classes
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, RobotName, assignments, point_of
-from screwkin.cli.output import aligned, drawn, print_json, remark
+from screwkin.cli.output import aligned, drawn, print_json, remark, say
 from screwkin.compiler.run import large_batches
 from screwkin.errors import MissingDependencyError
 from screwkin.mechanism.chain_files import load_chains
@@ -91,7 +91,7 @@ def info(
             facts.to_dict() | {"ik": solved, "large_batches": large_batches(), "touching_at_home": touching}
         )
     else:
-        print(_text(facts))
+        say(_text(facts))
     return 0
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from screwkin.errors import InputError
+from screwkin.errors import InputError, one_of
 from screwkin.servo.virtual.faults import KINDS, InjectedFault
 
 Faults = Annotated[
@@ -46,8 +46,6 @@ def _fault(text: str, start: float) -> InjectedFault:
         raise InputError(
             f"--inject-fault {text!r} is not understood; write KIND@FROM-TO:ID, as dropped@3-4:12"
         ) from None
-    if kind not in KINDS:
-        raise InputError(f"--inject-fault {text!r}: unknown kind {kind!r}; valid: {', '.join(KINDS)}")
     if not (0 <= first <= last and math.isfinite(first)):
         raise InputError(f"--inject-fault {text!r}: needs 0 <= FROM <= TO, in seconds")
-    return InjectedFault(kind, start + first, start + last, id)
+    return InjectedFault(one_of("kind of --inject-fault", kind, KINDS), start + first, start + last, id)

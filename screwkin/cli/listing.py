@@ -6,7 +6,7 @@ import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from screwkin.cli.output import aligned, print_json
+from screwkin.cli.output import aligned, print_json, say
 
 
 def list_tables(kind: str, names: Sequence[str], find: Callable[[str], Path], as_json: bool) -> int:
@@ -15,7 +15,7 @@ def list_tables(kind: str, names: Sequence[str], find: Callable[[str], Path], as
     if as_json:
         print_json({"names": list(described), "descriptions": described})
     else:
-        print(aligned(list(described.items())))
+        say(aligned(list(described.items())))
     return 0
 
 

@@ -14,7 +14,7 @@ import typer
 from screwkin.analysis.workspace import WorkspaceMap
 from screwkin.analysis.workspace import workspace as maps_of
 from screwkin.cli.folder import output_folder
-from screwkin.cli.output import aligned, drawn, print_json, progress_bar
+from screwkin.cli.output import aligned, drawn, print_json, progress_bar, say
 from screwkin.errors import InputError, UnreachableError
 from screwkin.files import atomic_write_bytes, npz_bytes
 from screwkin.model.robot import Robot
@@ -55,9 +55,9 @@ def run_maps(
     if as_json:
         print_json({**result.data, "folder": str(folder)})
     else:
-        print(result.title)
-        print(aligned(result.rows, "  "))
-        print(f"files in {folder}")
+        say(result.title)
+        say(aligned(result.rows, "  "))
+        say(f"files in {folder}")
     return 0
 
 

@@ -12,7 +12,7 @@ from screwkin.anatomy.humanoid import anatomy
 from screwkin.anatomy.record import Anatomy
 from screwkin.anatomy.written import commented_table
 from screwkin.cli.options import AsJson
-from screwkin.cli.output import aligned, print_json, remark
+from screwkin.cli.output import aligned, print_json, remark, say
 from screwkin.errors import InputError
 from screwkin.files import atomic_write
 from screwkin.model.table import load_robot
@@ -40,8 +40,8 @@ def new(
     if as_json:
         print_json(_data(found, path))
         return 0
-    print(f"{path}: {found.robot.name}, {len(found.robot.joints)} joints, confidence {found.confidence:.2f}")
-    print(aligned([(f.about, f"{f.confidence:.2f}", f.answer) for f in found.findings], "  "))
+    say(f"{path}: {found.robot.name}, {len(found.robot.joints)} joints, confidence {found.confidence:.2f}")
+    say(aligned([(f.about, f"{f.confidence:.2f}", f.answer) for f in found.findings], "  "))
     for text in found.remarks:
         remark(f"remark: {text}")
     return 0

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
+from screwkin.cli.terminal import columns_of, folded, manners, table_lines
 from screwkin.errors import MissingDependencyError, RobotRemark, SpeedRemark
 
 T = TypeVar("T")
@@ -39,8 +40,9 @@ def plain(value: Any) -> Any:
 
 
 def remark(text: str) -> None:
-    """A line for the reader that is no result."""
-    print(text, file=sys.stderr, flush=True)
+    """A line for the reader that is no result, on stderr; nothing if --quiet."""
+    if not manners().quiet:
+        print(folded(text, sys.stderr), file=sys.stderr, flush=True)
 
 
 @contextmanager
@@ -85,30 +87,35 @@ def silent(text: str) -> None:
     """Nothing: for those who asked for JSON alone."""
 
 
+def say(text: str) -> None:
+    """A result for the reader, on stdout: folded where the terminal is narrower; nothing if --quiet."""
+    if not manners().quiet:
+        print(folded(text, sys.stdout), flush=True)
+
+
 def aligned(rows: Sequence[Sequence[Any]], indent: str = "") -> str:
-    """Rows of cells as lines, every column as wide as its widest cell."""
+    """Rows of cells as lines, every column as wide as its widest cell, or as the terminal allows."""
+    width = columns_of(sys.stdout)
     cells = [[str(cell) for cell in row] for row in rows]
-    columns = max(map(len, cells), default=0)
-    widths = [max((len(row[k]) for row in cells if k < len(row)), default=0) for k in range(columns)]
-    return "\n".join(
-        (indent + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False))).rstrip()
-        for row in cells
-    )
+    lines = table_lines(cells, None if width is None else width - len(indent))
+    return "\n".join((indent + line).rstrip() for line in lines)
 
 
 @contextmanager
 def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
-    """A bar, percent and remaining time on stderr while it is a terminal, else nothing.
+    """A bar, percent and remaining time on stderr while it is a terminal, else, or if --quiet, nothing.
 
     Yields a function that takes the share done.
     """
-    if not sys.stderr.isatty():
+    if manners().quiet or not sys.stderr.isatty():
         yield lambda share: None
         return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
+    with Progress(
+        *columns, console=Console(stderr=True, no_color=not manners().color or None), transient=True
+    ) as shown:
         task = shown.add_task(label.replace("[", r"\["), total=1.0)
         yield lambda share: shown.update(task, completed=share)

@@ -13,7 +13,7 @@ from screwkin.analysis.replay import replayed
 from screwkin.analysis.validate import Validation
 from screwkin.analysis.verdict import Criteria
 from screwkin.cli.folder import output_folder
-from screwkin.cli.output import aligned, print_json, remark
+from screwkin.cli.output import aligned, print_json, remark, say
 from screwkin.cli.simulation import Wish, print_verdict, simulate_to_files
 from screwkin.report.numbers import validation_numbers
 from screwkin.report.pictures import save_servo_pictures
@@ -64,10 +64,10 @@ def replay(trajectory: Path, log: Path, wish: Wish, output: Path | None, as_json
 
 
 def _print(check: Validation, facts: dict[str, object], folder: Path) -> None:
-    print(
+    say(
         f"{facts['log']}: joints as measured, {facts['replayed_s']:.2f} s in {check.engine}; up to "
         f"{facts['max_deviation_deg']:.1f} deg from the plan"
     )
-    print(aligned(validation_numbers(check), "  "))
+    say(aligned(validation_numbers(check), "  "))
     print_verdict(check)
-    print(f"files in {folder}")
+    say(f"files in {folder}")

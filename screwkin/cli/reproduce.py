@@ -14,7 +14,7 @@ import typer
 
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder
-from screwkin.cli.output import aligned, plain, print_json, progress_bar, remark
+from screwkin.cli.output import aligned, plain, print_json, progress_bar, remark, say
 from screwkin.errors import MissingDependencyError
 from screwkin.files import atomic_write
 from screwkin.papers.bench import Bench
@@ -63,8 +63,8 @@ def reproduce(
     if as_json:
         print_json({"paper": paper.name, "rows": rows, "folder": str(folder)})
     else:
-        print(_text(result))
-        print(f"files in {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}")
+        say(_text(result))
+        say(f"files in {folder}: {', '.join(sorted(path.name for path in folder.iterdir()))}")
     return 0
 
 

@@ -13,7 +13,7 @@ from screwkin.analysis.readiness import Ready, ready
 from screwkin.cli.folder import output_folder
 from screwkin.cli.injected import Faults, FormerFaults, Seed, injected_faults
 from screwkin.cli.options import AsJson, OutputFolder, TrajectoryPath
-from screwkin.cli.output import print_json, remark
+from screwkin.cli.output import print_json, remark, say
 from screwkin.cli.playing import log_of, played, played_on_port
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.gait.compensation import way_of
@@ -144,7 +144,7 @@ def _print_dry(path: Path, frames: Frames, bounds: Bounds, facts: dict[str, Any]
             {"frames": len(frames.q), "late_frames": 0, "max_tracking_error": None, "faults": [], **facts}
         )
         return
-    print(
+    say(
         f"{path}: {len(frames.q)} frames of {len(bounds.ids)} servos at {frames.rate:g} Hz, within limits "
         f"and up to {facts['deviation_mm']:.1f} mm from the validated path\n"
         f"The bus carries at most {facts['bus_limit_hz']:.0f} frames per second, "
@@ -159,7 +159,7 @@ def _print_outcome(outcome: PlayOutcome, facts: dict[str, Any], bounds: Bounds, 
     if as_json:
         print_json({**outcome.to_dict(), **facts, "message": message})
     else:
-        print(
+        say(
             f"{outcome.frames} frames sent, {outcome.late_frames} late; largest tracking error "
             f"{outcome.max_tracking_error:.3f} rad; log in {facts['log']}"
         )

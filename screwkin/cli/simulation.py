@@ -14,7 +14,7 @@ from screwkin.analysis.engines import AUTO, ENGINES, Engine, SimulatedCompliance
 from screwkin.analysis.validate import Validation
 from screwkin.analysis.validate import validate as validated
 from screwkin.analysis.verdict import Criteria, verdict_of
-from screwkin.cli.output import drawn, plain, progress_bar, remark
+from screwkin.cli.output import drawn, plain, progress_bar, remark, say
 from screwkin.errors import UnknownNameError
 from screwkin.files import atomic_write
 from screwkin.report.names import FILM, PAGE, remove_reports
@@ -100,9 +100,9 @@ def simulate_to_files(account: Account, folder: Path, verdict: Path, wish: Wish)
 
 def print_verdict(check: Validation) -> None:
     """Passed, or not or undecided with every reason; warnings on stderr."""
-    print("passed" if check.passed else "UNDECIDED:" if check.undecided else "NOT passed:")
+    say("passed" if check.passed else "UNDECIDED:" if check.undecided else "NOT passed:")
     for reason in check.reasons:
-        print(f"  {reason}")
+        say(f"  {reason}")
     for warning in check.warnings:
         remark(f"warning: {warning}")
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.cli.loads import first_posture, loads_of
-from screwkin.cli.output import aligned, print_json
+from screwkin.cli.output import aligned, print_json, say
 from screwkin.compliance.cartesian import cartesian_compliance, cartesian_stiffness
 from screwkin.compliance.stiffness import Deflection, static_deflection
 from screwkin.errors import SingularError
@@ -39,7 +39,7 @@ def stiffness_at(
     if as_json:
         print_json(_data(robot, name, deflection, seen, C, K))
     else:
-        print(_text(robot, name, deflection, seen, C, K))
+        say(_text(robot, name, deflection, seen, C, K))
     return 0
 
 

@@ -13,6 +13,7 @@ import typer
 
 from screwkin.analysis import engines
 from screwkin.analysis.campaign import (
+    CONDITIONS,
     OFF,
     ON,
     Axes,
@@ -34,11 +35,11 @@ from screwkin.analysis.engines import SimulatedCompliance
 from screwkin.analysis.verdict import VERSIONED
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, FittingGait, GaitName, OutputFolder, RobotName, settings
-from screwkin.cli.output import aligned, drawn, print_json, progress_bar, remark
+from screwkin.cli.output import aligned, drawn, print_json, progress_bar, remark, say
 from screwkin.cli.simulation import engine as engine_named
 from screwkin.cli.sweep_optimise import bounds_of, optimise
 from screwkin.cli.walk import limbed
-from screwkin.errors import InputError, one_of
+from screwkin.errors import GaitError, InputError, near, one_of
 from screwkin.files import atomic_write, atomic_write_bytes, npz_bytes, versions
 from screwkin.gait.files import default_gait, load_gait
 from screwkin.gait.fitting import fitting_gait
@@ -153,7 +154,7 @@ def sweep(
         print_json({**_data(campaign, total, each, pairs), "folder": str(folder)})
     else:
         _print(campaign, total, each, pairs)
-        print(f"files in {folder}: {', '.join(sorted(p.name for p in folder.iterdir() if p.is_file()))}")
+        say(f"files in {folder}: {', '.join(sorted(p.name for p in folder.iterdir() if p.is_file()))}")
     for line in _crashes(done):
         remark(line)
     return 1 if total.crashed else 0
@@ -209,7 +210,11 @@ def _campaign(robot: Robot, axes: Axes, seeds: tuple[int, ...]) -> Campaign:
     gaits = {name: json.dumps(_gait(robot, name).to_dict()) for name in axes["gait"]}
     campaign = Campaign(robot_text(robot), gaits, axes, seeds, versions(*VERSIONED))
     for values in campaign.settings:
-        gait_of(campaign, values)
+        try:
+            gait_of(campaign, values)
+        except GaitError as error:
+            question = "".join(near(fault.key, CONDITIONS) for fault in error.faults).rstrip()
+            raise InputError(f"{error}. {question}") if question else error from None
     return campaign
 
 
@@ -286,11 +291,11 @@ def _print(campaign: Campaign, total: Tally, each: Sequence[Tally], pairs: Seque
     shown = lines[: SHOWN + 1]
     if len(each) > 1:
         shown.append(("all", *("" for _ in keys), *_cells(total)))
-    print(aligned(shown, "  "))
+    say(aligned(shown, "  "))
     if len(lines) > len(shown):
-        print(f"  … {len(lines) - SHOWN - 1} more settings in settings.csv")
+        say(f"  … {len(lines) - SHOWN - 1} more settings in settings.csv")
     for pair in [pair for pair in pairs if pair.pairs][:SHOWN]:
-        print(
+        say(
             f"  setting {pair.second} against {pair.first} on {pair.pairs} equal seeds: alone fell "
             f"{pair.only_second} against {pair.only_first}, p = {pair.p:.2g} (McNemar)"
         )

@@ -15,7 +15,7 @@ from screwkin.analysis.campaign_run import Workers, outcomes, standing_workers
 from screwkin.analysis.campaign_statistics import tally
 from screwkin.analysis.campaign_store import journal
 from screwkin.cli.folder import output_folder
-from screwkin.cli.output import print_json, progress_bar
+from screwkin.cli.output import print_json, progress_bar, say
 from screwkin.errors import InputError
 from screwkin.files import atomic_write
 from screwkin.gait.write import gait_toml
@@ -88,8 +88,8 @@ def optimise(
         about = {"objective": search.objective, "crashed": total.crashed, "folder": str(folder)}
         print_json({**counts, "optimum": values, **costs, **about})
     else:
-        print(_text(search, best))
-        print(f"gait in {folder / OPTIMUM}: screwkin walk {robot} --gait {folder / OPTIMUM}")
+        say(_text(search, best))
+        say(f"gait in {folder / OPTIMUM}: screwkin walk {robot} --gait {folder / OPTIMUM}")
     return 1 if total.crashed else 0
 
 

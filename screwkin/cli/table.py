@@ -8,9 +8,9 @@ import typer
 
 from screwkin.algebra.scalar import is_symbolic
 from screwkin.cli.options import AsJson, RobotName
-from screwkin.cli.output import print_json
+from screwkin.cli.output import aligned, print_json, say
 from screwkin.errors import InputError
-from screwkin.mechanism.printing import Style, print_symbolic, screw_rows, screw_table
+from screwkin.mechanism.printing import Style, print_symbolic, screw_cells, screw_rows, screw_table
 from screwkin.model.coupled import coupling_of
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
@@ -36,8 +36,12 @@ def table(
     if as_json:
         print_json(_data(loaded, print_symbolic(loaded, limb) if symbolic else None))
         return 0
-    parts = [screw_table(loaded, style), *([print_symbolic(loaded, limb, style)] if symbolic else [])]
-    print("\n\n".join(parts))
+    derived = [print_symbolic(loaded, limb, style)] if symbolic else []
+    if style == "text":
+        header, rows = screw_cells(loaded)
+        say("\n\n".join([aligned([header, *rows]), *derived]))
+    else:
+        print("\n\n".join([screw_table(loaded, style), *derived]))
     return 0
 
 

@@ -15,7 +15,7 @@ from screwkin.analysis.engines import AUTO, SimulatedCompliance, servo_for
 from screwkin.analysis.verdict import verdict_of
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, Perturbed, TrajectoryPath, perturbation_of
-from screwkin.cli.output import aligned, print_json, remark
+from screwkin.cli.output import aligned, print_json, remark, say
 from screwkin.cli.replay import replay
 from screwkin.cli.simulation import Wish, print_verdict, simulate_to_files
 from screwkin.cli.simulation import engine as engine_named
@@ -117,10 +117,10 @@ def validate(
     if as_json:
         print_json({"robot": account.robot.name, **verdict_of(account.robot, loaded, check).to_dict()})
     else:
-        print(f"{trajectory}: {account.robot.name}, {loaded.duration:.2f} s in {check.engine}")
-        print(aligned(validation_numbers(check), "  "))
+        say(f"{trajectory}: {account.robot.name}, {loaded.duration:.2f} s in {check.engine}")
+        say(aligned(validation_numbers(check), "  "))
         print_verdict(check)
-        print(f"files in {folder}{'' if folder == beside else f'; validation.json in {beside}'}")
+        say(f"files in {folder}{'' if folder == beside else f'; validation.json in {beside}'}")
     drop = clearing_hand_drop(account.robot, loaded, check.self_collisions or ())
     if drop is not None:
         remark(f"hands that hang higher clear all links: plan the walk with --set hand_drop={drop:g}")

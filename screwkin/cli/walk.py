@@ -14,7 +14,7 @@ from screwkin.anatomy.humanoid import anatomy
 from screwkin.cli.compensated import CompensateBy, Passes, ServoStiffness, compensated, remedy
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, FittingGait, GaitName, OutputFolder, RobotName, numbers_of, settings
-from screwkin.cli.output import aligned, drawn, print_json, progress_bar, remark
+from screwkin.cli.output import aligned, drawn, print_json, progress_bar, remark, say
 from screwkin.errors import InputError
 from screwkin.files import atomic_write
 from screwkin.gait.files import default_gait, load_gait
@@ -104,7 +104,7 @@ def walk(
     else:
         _print_summary(account, chosen, folder)
         if remedied is not None:
-            print(remedied.text())
+            say(remedied.text())
     return 0
 
 
@@ -219,8 +219,8 @@ def write_report(account: Account, folder: Path) -> Path:
 
 
 def _print_summary(account: Account, gait: Gait, folder: Path) -> None:
-    print(f"{account.robot.name} walks {account.steps} steps of gait {gait.name}")
-    print(aligned(walk_numbers(account), "  "))
+    say(f"{account.robot.name} walks {account.steps} steps of gait {gait.name}")
+    say(aligned(walk_numbers(account), "  "))
     for warning in account.warnings:
         remark(f"warning: {warning}")
     if account.outside.any():
@@ -228,4 +228,4 @@ def _print_summary(account: Account, gait: Gait, folder: Path) -> None:
             "warning: the ZMP leaves the support polygon: on the floor the robot would tip over "
             "(see screwkin validate)"
         )
-    print(f"files in {folder}: {', '.join(sorted(path.name for path in folder.iterdir() if path.is_file()))}")
+    say(f"files in {folder}: {', '.join(sorted(path.name for path in folder.iterdir() if path.is_file()))}")

@@ -10,7 +10,7 @@ import typer
 from screwkin.analysis.account import Account, account_of, recorded_robot
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, TrajectoryPath
-from screwkin.cli.output import aligned, drawn, print_json, progress_bar, remark
+from screwkin.cli.output import aligned, drawn, print_json, progress_bar, remark, say
 from screwkin.report.names import PAGE, remove_reports
 from screwkin.report.numbers import balance_data, balance_numbers
 from screwkin.trajectory import load_trajectory
@@ -40,12 +40,12 @@ def zmp(
         data = {"robot": account.robot.name, "samples": loaded.samples, **balance_data(account)}
         print_json({**data, **places})
     else:
-        print(f"{trajectory}: {account.robot.name}, {loaded.samples} samples, {loaded.duration:.2f} s")
-        print(aligned(balance_numbers(account), "  "))
+        say(f"{trajectory}: {account.robot.name}, {loaded.samples} samples, {loaded.duration:.2f} s")
+        say(aligned(balance_numbers(account), "  "))
         for warning in account.warnings:
             remark(f"warning: {warning}")
         if output is not None:
-            print(f"files in {output}")
+            say(f"files in {output}")
     return 3 if account.outside.any() else 0
 
 

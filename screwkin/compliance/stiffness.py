@@ -25,7 +25,7 @@ from screwkin.compliance.elastic import TURNS_FIRST, elastic
 from screwkin.compliance.equilibrium import SETTLED, Deflected, balances, equilibrium, first_order
 from screwkin.compliance.laws import Spring, checked_springs, refuse_beyond, spring_effort
 from screwkin.compliance.springs import SpringChoice, spring_stiffness
-from screwkin.errors import InputError, NoSolutionError, ShapeError, UnknownNameError
+from screwkin.errors import InputError, NoSolutionError, ShapeError, UnknownNameError, one_of
 from screwkin.kinematics.arrays import one_batch
 from screwkin.kinematics.body import center_of_mass, frame_pose
 from screwkin.kinematics.mass import GRAVITY
@@ -152,8 +152,7 @@ def static_deflection(
     Source: paper B, eq. 13 (given the load, find theta) and eq. 16 with the links' weights added; Klimchik,
     Chablat and Pashkevich (2014) for loads, closed loops and links.
     """
-    if method not in ("linear", "nonlinear"):
-        raise InputError(f"unknown method {method!r}; valid: linear, nonlinear")
+    one_of("method", method, ("linear", "nonlinear"))
     loaded, supports, batch = loaded_robot(robot, state, support, stiffness, gravity, loads, springs)
     if not (gravity and robot.mass > 0) and not loaded.loads and loaded.efforts is None:
         raise InputError(f"{robot.name} has no mass and no loads, so that nothing bends it; give it one")

@@ -32,7 +32,7 @@ from screwkin.algebra.se3 import as_array, pose_from_array, unstack
 from screwkin.compliance.springs import StiffnessChoice, drive_losses, joint_stiffness
 from screwkin.compliance.stiffness import Deflection, static_deflection
 from screwkin.compliance.stiffness import Method as StaticModel
-from screwkin.errors import InputError, LimitError, NoSolutionError
+from screwkin.errors import InputError, LimitError, NoSolutionError, one_of
 from screwkin.gait.driven import at_rest, driven
 from screwkin.gait.feed_forward import walking_torques
 from screwkin.gait.loads import load_distribution
@@ -313,8 +313,7 @@ def stiffness_of(trajectory: Trajectory) -> StiffnessChoice:
 
 def _check_choices(method: str, passes: object, model: str) -> None:
     for what, chosen, valid in (("method", method, METHODS), ("model", model, MODELS)):
-        if chosen not in valid:
-            raise InputError(f"unknown {what} {chosen!r} of compensation; valid: {', '.join(valid)}")
+        one_of(f"{what} of compensation", chosen, valid)
     if model == "dynamic" and method != "joint":
         raise InputError("model 'dynamic' is for method 'joint'; a foot's target is corrected by statics")
     if isinstance(passes, bool) or not isinstance(passes, numbers.Integral) or passes < 1:

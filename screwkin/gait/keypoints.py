@@ -19,7 +19,7 @@ from typing import Any, Literal
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.errors import Fault
+from screwkin.errors import Fault, near
 from screwkin.model.expression import ExpressionError, UnresolvedError, evaluate
 
 ChannelKind = Literal["swing", "advance", "alternate", "repeat"]
@@ -70,7 +70,7 @@ def read_channel(
         return None
     for key in raw:
         if key not in ("at", "value"):
-            faults.append(Fault(row, key, "unknown key", "Valid: at, value"))
+            faults.append(Fault(row, key, "unknown key", f"{near(key, ('at', 'value'))}Valid: at, value"))
     at, value = (_evaluated(row, key, raw.get(key), numbers, faults) for key in ("at", "value"))
     if at is None or value is None:
         return None

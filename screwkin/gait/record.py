@@ -237,7 +237,9 @@ def _flat(table: Mapping[str, Any], faults: list[Fault]) -> dict[str, Any]:
         flat[key] = table.get(key, choices[0])
         if flat[key] not in choices:
             found = f"{flat[key]!r} is not understood"
-            faults.append(Fault(row, key, found, f"Valid: {', '.join(choices)}"))
+            faults.append(
+                Fault(row, key, found, f"{near(str(flat[key]), choices)}Valid: {', '.join(choices)}")
+            )
     for key, default in NUMBERS.items():
         if key in table or default is not None:
             flat[key] = table.get(key, default)

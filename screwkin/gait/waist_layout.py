@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
-from screwkin.errors import InputError
+from screwkin.errors import InputError, UnknownNameError
 from screwkin.gait.free_path import BUMPS, HARMONICS, free_path
 from screwkin.gait.record import Gait, gait_from_dict
 from screwkin.gait.waist import waist_path
@@ -43,7 +43,7 @@ class Layout:
         faults = []
         for key, count in self.counts.items():
             if key not in SHAPE:
-                faults.append(f"unknown key {key!r}; valid: {', '.join(SHAPE)}")
+                faults.append(str(UnknownNameError("key", key, list(SHAPE))))
             elif not is_count(count):
                 faults.append(f"{key} is {count!r}, expected a whole number, at least 0")
             elif key in HARMONICS and count % 2:

@@ -10,7 +10,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.scalar import is_jax
-from screwkin.errors import InputError
+from screwkin.errors import InputError, one_of
 from screwkin.ik.linked import linked_chain, with_linkages
 from screwkin.ik.methods import Method, solve_limb_arrays
 from screwkin.ik.numeric import IkSettings
@@ -85,8 +85,7 @@ def limb_ik(
         >>> legs.q.shape, bool(legs.valid[0])
         ((8, 6), True)
     """
-    if method not in get_args(Method):
-        raise InputError(f"method is {method!r}; valid: {', '.join(get_args(Method))}")
+    one_of("method", method, get_args(Method))
     chain = limb_chain(robot, limb)
     _refuse_joined(robot, chain.limb)
     settings, start = settings or DEFAULT, resting(robot, chain) if guess is None else guess

@@ -71,8 +71,7 @@ def solve_pose(
         >>> sk.solve_pose(robot, {"right_foot": T_world_foot}).ok
         True
     """
-    if method not in get_args(Method):
-        raise InputError(f"method is {method!r}; valid: {', '.join(get_args(Method))}")
+    one_of("method", method, get_args(Method))
     given, labels = dict(targets), {name: f"targets[{name!r}]" for name in targets}
     guess = home(robot) if guess is None else guess
     if "base" not in given:

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 from screwkin.algebra.scalar import Scalar
 from screwkin.algebra.se3 import IDENTITY, UNTURNED, Pose, Rotation, Twist, Vector
-from screwkin.errors import InputError
+from screwkin.errors import InputError, near
 from screwkin.mechanism.pairs import (
     NAMED,
     pair_coordinates,
@@ -37,7 +37,8 @@ def check_chain(chain: Sequence[str]) -> tuple[str, ...]:
     unknown = [c for c in chain if c not in SPATIAL]
     if unknown:
         raise InputError(
-            f"virtual chain {chain}: unknown coupling {unknown[0]!r}; valid: {', '.join(SPATIAL)}"
+            f"virtual chain {chain}: unknown coupling {unknown[0]!r}. {near(unknown[0], SPATIAL)}"
+            f"Valid: {', '.join(SPATIAL)}"
         )
     if len(set(chain)) < len(chain):
         raise InputError(f"virtual chain {chain}: a coupling stands twice; each may stand once")

@@ -34,7 +34,7 @@ from screwkin.algebra.se3 import (
     dot,
     rotate,
 )
-from screwkin.errors import InputError
+from screwkin.errors import InputError, near
 
 PAIRS = ("px", "py", "pz", "rx", "ry", "rz")
 NAMED = {
@@ -74,7 +74,8 @@ def check_pairs(pairs: Sequence[str], name: str) -> tuple[str, ...]:
     unknown = [c for c in pairs if c not in PAIRS]
     if unknown or not pairs:
         what = f"unknown coupling {unknown[0]!r}" if unknown else "no couplings"
-        raise InputError(f"chain {name}: {what}; valid: {', '.join(PAIRS)}")
+        question = near(unknown[0], PAIRS) if unknown else ""
+        raise InputError(f"chain {name}: {what}. {question}Valid: {', '.join(PAIRS)}")
     generic = [0.3 + 0.2 * k for k in range(len(pairs))]
     here = pair_pose(pairs, generic)
     screws = as_array(pair_screws(pairs, generic, IDENTITY, here.p))

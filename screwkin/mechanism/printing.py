@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args
 
 from screwkin.algebra.scalar import Scalar, is_symbolic
 from screwkin.algebra.se3 import Vector, cross
-from screwkin.errors import InputError
+from screwkin.errors import one_of
 from screwkin.mechanism.symbolic import SymbolicLimb, symbolic_limb, symbolic_loops
 from screwkin.model.coupled import coupling_text
 from screwkin.model.records import CoupledJoint
@@ -60,6 +60,19 @@ def screw_table(robot: Robot, style: Style = "text") -> str:
     Raises:
         InputError: no such style.
     """
+    return _table(*screw_cells(robot, style), style)
+
+
+def screw_cells(robot: Robot, style: Style = "text") -> tuple[list[str], list[list[str]]]:
+    """Header and rows of the screw table.
+
+    Args:
+        robot: numeric or symbolic.
+        style: plain text, Markdown or LaTeX.
+
+    Raises:
+        InputError: no such style.
+    """
     _check(style)
     write = _Writer(style, {})
     header = ["joint", "type", "s", "s0 [m]", "pitch [m/rad]", "s0 x s [m]"]
@@ -76,7 +89,7 @@ def screw_table(robot: Robot, style: Style = "text") -> str:
             cells[-1].append(write.name(follows))
     if robot.coupled:
         header.append("position")
-    return _table(header, cells, style)
+    return header, cells
 
 
 def print_symbolic(robot: Robot, limb: str | None = None, style: Style = "text") -> str:
@@ -162,8 +175,7 @@ def _vectors(header: list[str], rows: Sequence[tuple[str, tuple[Any, ...]]], wri
 
 
 def _check(style: str) -> None:
-    if style not in get_args(Style):
-        raise InputError(f"style is {style!r}; valid: {', '.join(get_args(Style))}")
+    one_of("style", style, get_args(Style))
 
 
 def _heading(text: str, level: int, style: Style) -> str:

@@ -29,7 +29,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from screwkin.errors import Fault, InputError, TableError, UnknownNameError
+from screwkin.errors import Fault, InputError, TableError, UnknownNameError, near
 from screwkin.files import text_sha256
 from screwkin.model.robot import Robot
 from screwkin.model.toml import read_text, read_toml
@@ -222,7 +222,7 @@ def name_faults(table: Mapping[str, Any]) -> Iterator[Fault]:
     """Faults of what stands at the top of a model's file, before its sections."""
     for key in table:
         if key not in _TOP:
-            yield Fault("", key, "is unknown", f"Known are {', '.join(_TOP)}")
+            yield Fault("", key, "is unknown", f"{near(key, _TOP)}Known are {', '.join(_TOP)}")
     if not (isinstance(table.get("model"), str) and table["model"].strip()):
         yield Fault("", "model", f"is {table.get('model')!r}", "Write the name of the servo model")
     aliases = table.get("aliases", [])
@@ -256,7 +256,7 @@ def _faults(table: Mapping[str, Any]) -> Iterator[Fault]:
 def _number_faults(place: str, given: Mapping[str, Any], known: tuple[str, ...]) -> Iterator[Fault]:
     for name, value in given.items():
         if name not in known:
-            yield Fault(place, name, "is unknown", f"Known are {', '.join(known)}")
+            yield Fault(place, name, "is unknown", f"{near(name, known)}Known are {', '.join(known)}")
         elif not (_is_number(value) or (name == "max_current" and value == math.inf)):
             yield Fault(place, name, f"is {value!r}", "Write a finite number")
         elif value < 0 or (value == 0 and name in POSITIVE):

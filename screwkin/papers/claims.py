@@ -17,7 +17,7 @@ from typing import Annotated, Any, Literal
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic_core import ErrorDetails
 
-from screwkin.errors import Fault, FileFaults
+from screwkin.errors import Fault, FileFaults, near
 from screwkin.model.library import find_paper
 from screwkin.model.toml import read_text, read_toml
 
@@ -153,7 +153,7 @@ def _fault(error: ErrorDetails) -> Fault:
     where = ", ".join(f"{name} {number}" for name, number in zip(names[1:], numbers, strict=False))
     if error["type"] == "unexpected_keyword_argument":
         known = [_ALIASES.get(f.name, f.name) for f in fields(_RECORDS[names[-1]])]
-        return Fault(where or "[paper]", key, "unknown key", f"Valid: {', '.join(known)}")
+        return Fault(where or "[paper]", key, "unknown key", f"{near(key, known)}Valid: {', '.join(known)}")
     found, fix = {
         "missing": ("missing", "Give it"),
         "tuple_type": ("no list of tables", f"Write [[{key}]]"),

@@ -35,7 +35,7 @@ from collections.abc import Callable, Iterator, Mapping
 from itertools import pairwise
 from typing import Any, Literal, get_args
 
-from screwkin.errors import Fault
+from screwkin.errors import Fault, near
 from screwkin.motors.library import name_faults
 from screwkin.servo.protocols import CODECS
 
@@ -145,7 +145,7 @@ def _section_faults(
             yield Fault(place, key, "is missing", f"Write {kinds[key][1]}")
     for key, value in given.items():
         if key not in kinds:
-            yield Fault(place, key, "is unknown", f"Known are {', '.join(kinds)}")
+            yield Fault(place, key, "is unknown", f"{near(key, kinds)}Known are {', '.join(kinds)}")
         elif not kinds[key][0](value):
             yield Fault(place, key, f"is {value!r}", f"Write {kinds[key][1]}")
 

@@ -23,7 +23,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from screwkin.errors import Fault, InputError, TableError, UnknownNameError
+from screwkin.errors import Fault, InputError, TableError, UnknownNameError, near
 from screwkin.files import text_sha256
 from screwkin.mechanism.linkages import motor_joints
 from screwkin.model.robot import Robot
@@ -191,7 +191,7 @@ def _faults(
         return
     for key in servos:
         if key not in KEYS:
-            yield Fault("[servos]", key, "is unknown", f"Known are {', '.join(KEYS)}")
+            yield Fault("[servos]", key, "is unknown", f"{near(key, KEYS)}Known are {', '.join(KEYS)}")
     models = {key: servos.get(key, default) for key, default in (("models", {}), ("model", None))}
     named = [("model", models["model"])] if models["model"] is not None or not models["models"] else []
     if isinstance(models["models"], Mapping):

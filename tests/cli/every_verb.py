@@ -146,8 +146,8 @@ def _installed(package: str) -> bool:
         return False
 
 
-def called(verbs: Mapping[str, str]) -> Iterator[tuple[str, int, str]]:
-    """Name, exit code and stderr of every verb, called one after the other in this folder."""
+def called(verbs: Mapping[str, str]) -> Iterator[tuple[str, int, str, str]]:
+    """Name, exit code, stdout and stderr of every verb, called one after the other in this folder."""
     from screwkin.cli import run
     from screwkin.model import table
 
@@ -158,7 +158,7 @@ def called(verbs: Mapping[str, str]) -> Iterator[tuple[str, int, str]]:
         out, err = io.StringIO(), io.StringIO()
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
             code = run(words.split())
-        yield name, code, err.getvalue()
+        yield name, code, out.getvalue(), err.getvalue()
 
 
 def fault(name: str, code: int, err: str, absent: Collection[str]) -> str:
@@ -182,7 +182,7 @@ def main() -> int:
     wrong = 0
     with tempfile.TemporaryDirectory() as folder:
         os.chdir(folder)
-        for name, code, err in called(chosen(absent) | DEMO):
+        for name, code, _, err in called(chosen(absent) | DEMO):
             said = fault(name, code, err, absent)
             package = expected(name, absent)[1]
             print(f"  {name:<20}{code}  {said or ('asks for ' + package if package else '')}", flush=True)

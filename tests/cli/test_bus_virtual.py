@@ -73,7 +73,7 @@ def test_a_pulled_cable_ends_it(cli):
 @pytest.mark.parametrize(
     ("words", "part"),
     [
-        (["--inject-fault", "fire@1"], "unknown kind 'fire'; valid: deaf"),
+        (["--inject-fault", "fire@1"], "unknown kind of --inject-fault 'fire'; valid: deaf"),
         (["--inject-fault", "late@x"], "KIND@FROM-TO:ID"),
         (["--inject-fault", "late@3-2"], "0 <= FROM <= TO"),
         (["--seconds", "nan"], "is no time"),

@@ -16,7 +16,9 @@ def test_versions_are_those_installed_and_the_table_names_them(cli):
     text = cli("doctor").out
     for name in verb.LIBRARIES:
         assert f"\n{name} " in text
-    rows = cli("doctor", "--report").out.splitlines()
+    questions, _, here = cli("doctor", "--report").out.partition("## This computer\n\n")
+    assert all(f"## {question}\n" in questions for question in verb.QUESTIONS)
+    rows = here.splitlines()
     assert rows[1] == "|---|---|---|"
     assert f"| numpy | {np.__version__} | all of it |" in rows
 

@@ -29,13 +29,18 @@ from tests.cli.every_verb import called
 print(json.dumps(list(called(json.loads(sys.argv[2])))))
 """
 
+NARROW_AND_FRENCH = {"COLUMNS": "60", "LC_ALL": "fr_FR.ISO-8859-1", "PYTHONUTF8": "0"}
+"""A terminal of 60 columns, in a locale that writes commas for points and knows no UTF-8."""
+LONG = 30
+"""Letters of a word, such as a path, that may stand across the end of a line."""
+
 
 def without(folder: Path, absent: list[str], code: str, *words: str) -> subprocess.CompletedProcess[str]:
     """A program in a process of its own, in which some libraries are absent."""
     return subprocess.run(
         [sys.executable, "-c", code, json.dumps(absent), *words],
         cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(CHECKOUT)},
+        env={**os.environ, "PYTHONPATH": str(CHECKOUT), **NARROW_AND_FRENCH},
         capture_output=True,
         text=True,
         timeout=600,
@@ -58,8 +63,10 @@ def test_what_needs_an_absent_library_says_how_to_install_it_and_all_else_works(
     done = without(tmp_path, absent, CODE, json.dumps(whole))
     assert done.returncode == 0, done.stderr
     answers = json.loads(done.stdout)
-    assert [name for name, _, _ in answers] == list(whole)
-    assert not [(name, said) for name, code, err in answers if (said := fault(name, code, err, absent))]
+    assert [name for name, _, _, _ in answers] == list(whole)
+    assert not [(name, said) for name, code, _, err in answers if (said := fault(name, code, err, absent))]
+    lines = [(name, line) for name, _, out, err in answers for line in (out + err).splitlines()]
+    assert not [at for at in lines if len(at[1]) > 60 and max(map(len, at[1].split())) < LONG]
     assert (tmp_path / "demo" / "report.html").exists() == everything, "what was done so far"
 
 

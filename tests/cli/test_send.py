@@ -127,7 +127,7 @@ def test_positions_beyond_the_limits_are_refused_with_joint_and_time(cli, refuse
     ("words", "told"),
     [
         (["--inject-fault", "deaf@3"], "--inject-fault is for virtual servos"),
-        (["--virtual", "--inject-fault", "fire@3"], "unknown kind 'fire'"),
+        (["--virtual", "--inject-fault", "fire@3"], "unknown kind of --inject-fault 'fire'"),
         (["--go"], "--go needs a bus"),
         (["--port", "/dev/none", "--virtual"], "two buses"),
         (["--rate", "nan"], "rate"),

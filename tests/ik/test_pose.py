@@ -318,7 +318,7 @@ def test_wrong_targets_are_refused_before_anything_is_computed(bioloid, targets,
 
 
 def test_an_unknown_method_is_refused(bioloid):
-    with pytest.raises(InputError, match="method is 'magic'; valid: auto, newton"):
+    with pytest.raises(InputError, match="unknown method 'magic'; valid: auto, newton"):
         sk.solve_pose(bioloid, {"right_foot": np.eye(4)}, method="magic")
 
 

@@ -293,5 +293,5 @@ def test_a_linkage_is_printed_by_its_loops():
 
 @pytest.mark.parametrize("function", [screw_table, print_symbolic])
 def test_an_unknown_style_is_refused_and_the_valid_ones_are_listed(symbolic, function):
-    with pytest.raises(InputError, match="style is 'html'; valid: text, markdown, latex"):
+    with pytest.raises(InputError, match="unknown style 'html'; valid: text, markdown, latex"):
         function(symbolic, style="html")

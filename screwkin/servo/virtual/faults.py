@@ -9,7 +9,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from screwkin.errors import InputError
+from screwkin.errors import InputError, one_of
 from screwkin.servo.virtual.servo import VirtualServo
 
 Kind = Literal[
@@ -53,8 +53,7 @@ class InjectedFault:
     volts: float = 5.0
 
     def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise InputError(f"unknown fault {self.kind!r}; valid: {', '.join(KINDS)}")
+        one_of("fault", self.kind, KINDS)
         if not (self.at <= self.until and 0 <= self.share <= 1):
             raise InputError(f"{self}: needs at <= until, and a share from 0 to 1")
 
