@@ -70,7 +70,8 @@ def _folded(line: str, width: int) -> str:
     if len(line) <= width:
         return line
     indent = line[: len(line) - len(line.lstrip())]
-    return "\n".join(_lines(line.lstrip(), width - len(indent) - 2, indent, indent + "  "))
+    lines = _lines(_tied(line.lstrip()), width - len(indent) - 2, indent, indent + "  ")
+    return "\n".join(lines).replace(_TIE, " ")
 
 
 def _lines(text: str, width: int, first: str = "", then: str = "") -> list[str]:
@@ -109,9 +110,12 @@ def table_lines(cells: Sequence[Sequence[str]], width: int | None) -> list[str]:
     return [line.replace(_TIE, " ") for line in lines]
 
 
-def _tied(cell: str) -> str:
-    """A cell whose vectors are not folded."""
-    return re.sub(r"\([-+\d.,e ]+\)", lambda vector: vector[0].replace(" ", _TIE), cell)
+_TIED = re.compile(r"\([-+\d.,e ]+\)|\S*python\S* -m pip install \S+")
+
+
+def _tied(text: str) -> str:
+    """A text whose vectors and commands of installation are not folded."""
+    return _TIED.sub(lambda one: one[0].replace(" ", _TIE), text)
 
 
 def _total(widths: Sequence[int]) -> int:
