@@ -200,7 +200,7 @@ def test_another_robot_with_arms_is_compensated_too() -> None:
     ("choice", "message"),
     [
         ({"method": "foot"}, "unknown method of compensation 'foot'; valid: swing, joint"),
-        ({"model": "cubic"}, "unknown model 'cubic' of compensation; valid: linear, nonlinear, dynamic"),
+        ({"model": "cubic"}, "unknown model of compensation 'cubic'; valid: linear, nonlinear, dynamic"),
         ({"model": "dynamic", "method": "swing"}, "model 'dynamic' is for method 'joint'"),
         ({"passes": 0}, "passes is 0; it must be a whole number of at least 1"),
         ({"passes": 1.5}, "passes is 1.5"),
