@@ -117,9 +117,7 @@ def _run(words: Sequence[str], debug: bool) -> int:
 def _dispatch(words: Sequence[str]) -> int:
     """Call the verb of a command line."""
     if COMPLETION in os.environ:
-        from screwkin.cli.completion import answer
-
-        return answer()
+        return int(_completion().answer())
     name = words[0] if words else "--help"
     if name in ("--help", "-h", "help"):
         from screwkin.cli.output import aligned, say
@@ -132,9 +130,7 @@ def _dispatch(words: Sequence[str]) -> int:
         print(f"screwkin {__version__}")
         return 0
     if name in ("--install-completion", "--show-completion"):
-        from screwkin.cli.completion import script
-
-        return script(name == "--install-completion", *words[1:2])
+        return int(_completion().script(name == "--install-completion", *words[1:2]))
     if name.startswith("-"):
         question = near(name, OPTIONS)
         raise InputError(f"unknown option {name}. {question}screwkin --help lists the options and verbs")
@@ -152,6 +148,11 @@ def _dispatch(words: Sequence[str]) -> int:
     if code == _INTERRUPTED:  # typer's answer to an interrupt, older versions abort
         raise KeyboardInterrupt
     return int(code or 0)
+
+
+def _completion() -> Any:
+    """The module of completion, which knows the verbs."""
+    return import_module(f"{__name__}.completion")
 
 
 def verb_app(name: str) -> Any:

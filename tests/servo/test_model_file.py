@@ -81,7 +81,7 @@ def test_a_users_file_may_also_hold_the_motor(mine):
         (
             "no_load_rpm = 59.0",
             "no_load_rps = 1",
-            r"\[sheet\], key no_load_rps: is unknown. Did you mean 'no_load_rpm'? Known are source",
+            r"\[sheet\], key no_load_rps: is unknown. Did you mean 'no_load_rpm'\? Known are source",
         ),
         (
             "protocol = 1.0",
