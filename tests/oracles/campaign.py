@@ -1,4 +1,4 @@
-"""Random closed mechanisms by hundreds: their motions and actions are dual, their dynamics are Pinocchio's.
+"""Random closed mechanisms by hundreds: their motions and actions are dual, their dynamics are the engines'.
 
     python -m tests.oracles.campaign --runs 1000 --results docs/mechanisms.jsonl
 

@@ -1,4 +1,4 @@
-"""Robots with loops of their own: Pinocchio's constraint dynamics, and MuJoCo's constrained inverse."""
+"""Robots with loops of their own: constraint dynamics of Pinocchio and of MuJoCo."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ CASES = [
 
 
 @pytest.mark.parametrize("case", CASES)
-def test_efforts_of_a_motion_cause_it_in_pinocchio_too(case):
+def test_efforts_of_a_motion_cause_it_in_pinocchio_and_mujoco_too(case):
     """Newton's law along the motions that the loops leave free, loops that stay closed, and the way back."""
     robot = random_loops(*case)
     home = sk.home(robot)
