@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array, numpy_of
-from screwkin.algebra.newton import newton
+from screwkin.algebra.newton import Residual, newton
 from screwkin.algebra.scalar import is_jax
 from screwkin.errors import InputError, LimitError, NoSolutionError, one_of
 from screwkin.kinematics.arrays import checked
@@ -20,6 +20,10 @@ lines between; or a function of deflections (...) that returns efforts (...) and
 
 REACHED = 1e-12
 """Largest error of a deflection that a function's spring is solved for [rad or m]."""
+FULL_STEPS = 8
+"""Steps of Newton's method, each shorter than the one before; where it takes more, they are damped."""
+LONGEST = 0.5
+"""The longest of these steps [rad or m]."""
 
 
 def checked_springs(robot: Robot, springs: Mapping[str, Spring] | None) -> dict[int, Spring]:
@@ -28,17 +32,18 @@ def checked_springs(robot: Robot, springs: Mapping[str, Spring] | None) -> dict[
     Raises:
         UnknownNameError: no such joint. InputError: a table does not increase, or has an effort at rest.
     """
-    laws: dict[int, Spring] = {}
-    for name, spring in (springs or {}).items():
-        one_of("joint", name, robot.joint_names)
-        laws[robot.joint_names.index(name)] = spring if callable(spring) else _pairs(name, spring)
-    return laws
+    places = {name: i for i, name in enumerate(robot.joint_names)} if springs else {}
+    return {
+        one_of("joint", name, places): spring if callable(spring) else _pairs(name, spring)
+        for name, spring in (springs or {}).items()
+    }
 
 
 def spring_effort(law: Any, deflection: Array) -> tuple[Array, Array]:
     """Effort and slope (...) of a law at deflections (...); beyond a table's ends its last lines go on."""
     if callable(law):
-        effort, slope = (np.asarray(x, float) for x in law(deflection))
+        effort, slope = law(deflection)
+        effort, slope = np.asarray(effort, float), np.asarray(slope, float)
         if effort.shape == slope.shape == deflection.shape:
             return effort, slope
         return np.broadcast_to(effort, deflection.shape), np.broadcast_to(slope, deflection.shape)
@@ -67,29 +72,51 @@ def spring_deflections(laws: Mapping[str, Any], efforts: Sequence[Array]) -> lis
 
 
 def _solved(laws: Mapping[str, Any], efforts: Mapping[str, Array]) -> list[Array]:
-    """Deflections of functions, all joints at once: their slopes are the only couplings."""
+    """Deflections of functions, of every joint by itself; joints on one function ask it in one call."""
     if any(is_jax(effort) for effort in efforts.values()):
         raise InputError(
             f"springs of {', '.join(efforts)} are functions, which are solved in NumPy; give tables of pairs"
         )
-    wanted = np.stack(np.broadcast_arrays(*efforts.values()), axis=-1)
-    flat, names = wanted.reshape(-1, len(efforts)), list(efforts)
+    alike: dict[int, list[str]] = {}
+    for name in efforts:
+        alike.setdefault(id(laws[name]), []).append(name)
+    names = [name for group in alike.values() for name in group]
+    wanted = np.stack(np.broadcast_arrays(*(efforts[name] for name in names)))
+    flat, size = wanted.reshape(-1, 1), wanted[0].size
+    chosen = [laws[group[0]] for group in alike.values()]
+    ends = np.cumsum([size * len(group) for group in alike.values()])
 
     def residual(x: Array, at: Array) -> tuple[Array, Array]:
-        here = [spring_effort(laws[name], x[:, k]) for k, name in enumerate(names)]
-        effort, slope = (np.stack(columns, axis=-1) for columns in zip(*here, strict=True))
-        stiff = np.where(slope > 0, slope, np.nan)
-        return (flat[at] - effort) / stiff, np.tile(np.eye(len(names)), (len(at), 1, 1))
+        cuts = [0, *np.searchsorted(at, ends).tolist()]
+        here = [spring_effort(law, x[a:b, 0]) for law, a, b in zip(chosen, cuts, cuts[1:], strict=False)]
+        effort, slope = (np.concatenate(parts)[:, None] for parts in zip(*here, strict=True))
+        return (flat[at] - effort) / np.where(slope > 0, slope, np.nan), np.ones((len(at), 1, 1))
 
-    solved = newton(residual, np.zeros(flat.shape), REACHED)
-    if not (solved.residual <= REACHED).all():
-        left, _ = residual(solved.x, np.arange(len(flat)))
-        sample, k = np.unravel_index(np.abs(np.nan_to_num(left, nan=np.inf)).argmax(), left.shape)
-        raise NoSolutionError(
-            f"{names[k]} carries {flat[sample, k]:.4g}, and its spring's function does not rise to it from "
-            "rest; its slope must be positive"
-        )
-    return list(np.moveaxis(solved.x.reshape(wanted.shape), -1, 0))
+    everyone = np.arange(len(flat))
+    x, left = np.zeros(flat.shape), np.inf
+    for _ in range(FULL_STEPS):
+        step, _ = residual(x, everyone)
+        x += np.clip(step, -LONGEST, LONGEST)
+        worst = float(np.abs(step).max(initial=0.0))
+        if not REACHED < worst < left:
+            break
+        left = worst
+    if not worst <= REACHED:
+        x = _safely(residual, flat, lambda k: names[k // size])
+    found = dict(zip(names, x.reshape(wanted.shape), strict=True))
+    return [found[name] for name in efforts]
+
+
+def _safely(residual: Residual, efforts: Array, name: Callable[[int], str]) -> Array:
+    """Deflections (m, 1) at efforts (m, 1), where full steps do not lead there."""
+    solved = newton(residual, np.zeros(efforts.shape), REACHED)
+    if (solved.residual <= REACHED).all():
+        return solved.x
+    worst = int(np.nan_to_num(solved.residual, nan=np.inf).argmax())
+    raise NoSolutionError(
+        f"{name(worst)} carries {efforts[worst, 0]:.4g}, and its spring's function does not rise to it from "
+        "rest; its slope must be positive"
+    )
 
 
 def refuse_beyond(name: str, ends: Array, values: Any, verb: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -131,15 +132,16 @@ def _by_joint(
             raise UnknownNameError("joint", name, robot.joint_names)
     for name, value in by_name.items():
         number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
-        number |= arrays and isinstance(value, np.ndarray) and value.dtype.kind in "iuf"
-        if not (number and np.isfinite(value).all() and np.all(valid(name, value))):
+        several = arrays and isinstance(value, np.ndarray) and value.dtype.kind in "iuf"
+        sound = math.isfinite(value) if number else several and np.isfinite(value).all()
+        if not (sound and (valid(name, value) if number else np.all(valid(name, value)))):
             where = "" if name == "default" else f" of {name}"
             raise InputError(f"{what}{where} is {value!r}; it must be {expected}")
     missing = [name for name in robot.joint_names if name not in by_name and "default" not in by_name]
     if missing:
         raise InputError(f"no {what} for {', '.join(missing)}; name them, or give a default")
     every = {**dict.fromkeys(robot.joint_names, by_name.get("default")), **by_name}
-    if not any(np.ndim(value) for value in every.values()):
+    if not any(isinstance(value, np.ndarray) for value in every.values()):
         return np.array([every[name] for name in robot.joint_names], dtype=float)
     columns = [np.asarray(every[name], dtype=float) for name in robot.joint_names]
     batch = one_batch(

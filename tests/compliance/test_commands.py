@@ -65,6 +65,33 @@ def test_a_spring_of_a_table_deflects_by_what_lies_between_its_pairs(robot):
         sk.compensate(robot, home, np.eye(18)[i] * 2, 50.0, {name: table})
 
 
+def test_joints_on_one_function_ask_it_together_and_each_gets_what_it_gets_alone(robot):
+    """At rest, and then some steps of Newton's method; own functions lead to the same commands."""
+    home, names, sizes = sk.home(robot), robot.joint_names, []
+
+    def law(x):
+        sizes.append(x.shape)
+        return 20 * x + 400 * x**3, 20 + 1200 * x**2
+
+    efforts = np.random.default_rng(3).uniform(-0.5, 0.5, (3, 18))
+    together = sk.compensate(robot, home, efforts, None, dict.fromkeys(names, law))
+    assert len(sizes) <= 5
+    assert {*sizes} == {(54,)}
+    deflection = together - home.q
+    np.testing.assert_allclose(20 * deflection + 400 * deflection**3, efforts, rtol=0, atol=1e-12)
+    apart = {name: lambda x: law(x) for name in names}
+    assert len({id(one) for one in apart.values()}) == 18
+    np.testing.assert_array_equal(sk.compensate(robot, home, efforts, None, apart), together)
+
+
+def test_a_function_that_full_steps_overshoot_is_solved_with_damped_ones(robot):
+    """atan bends over: Newton's full steps from rest leave 1.5 N m, shorter ones do not."""
+    home, i = sk.home(robot), robot.joint_names.index("right_knee")
+    law = {"right_knee": lambda x: (10 * np.arctan(20 * x), 200 / (1 + (20 * x) ** 2))}
+    commands = sk.compensate(robot, home, np.eye(18)[i] * 13.5, 50.0, law)
+    assert commands[i] - home.q[i] == pytest.approx(np.tan(1.35) / 20, abs=1e-11)
+
+
 def test_jax_in_jax_out(robot):
     import jax
 
