@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from screwkin.analysis.validate import Validation, validate
     from screwkin.compliance.cartesian import cartesian_stiffness
     from screwkin.compliance.commands import compensate
+    from screwkin.compliance.elastic_commands import elastic_commands
     from screwkin.compliance.stiffness import static_deflection
     from screwkin.dynamics.contact import ContactPatch
     from screwkin.dynamics.contact_forces import contact_forces
@@ -54,6 +55,7 @@ _HOMES = {
     "analysis.validate": "Validation validate",
     "compliance.cartesian": "cartesian_stiffness",
     "compliance.commands": "compensate",
+    "compliance.elastic_commands": "elastic_commands",
     "compliance.stiffness": "static_deflection",
     "dynamics.contact": "ContactPatch",
     "dynamics.contact_forces": "contact_forces",
@@ -111,6 +113,7 @@ __all__ = [
     "com_jacobian",
     "compensate",
     "contact_forces",
+    "elastic_commands",
     "fitting_gait",
     "footsteps",
     "forward_dynamics",

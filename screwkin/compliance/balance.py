@@ -51,6 +51,7 @@ class Loaded:
         loads: wrench (B, 6) by frame, [m about its origin; f], world axes; they go along with the frame.
         efforts: (B, n) of loads on joints [N m or N].
         held: further constraints.
+        placed: base poses (B, 4, 4) and positions (B, n) that say where supports are; default: as commanded.
     """
 
     robot: Robot
@@ -64,6 +65,7 @@ class Loaded:
     loads: Mapping[str, Array] = field(default_factory=dict)
     efforts: Array | None = None
     held: tuple[Ends, ...] = ()
+    placed: tuple[Array, Array] | None = None
 
     @property
     def is_plain(self) -> bool:
@@ -137,9 +139,9 @@ class ElasticBalance:
 
 
 def stands(loaded: Loaded, rows: Array) -> list[Pose]:
-    """Commanded poses of the support, and where every frame is held that is held in the world."""
-    T = pose_from_array(loaded.T_world_base[rows])
-    D = link_displacements(loaded.robot, unstack(loaded.q[rows]))
+    """Poses of the support, and where every frame is held that is held in the world."""
+    base, q = loaded.placed or (loaded.T_world_base, loaded.q)
+    T, D = pose_from_array(base[rows]), link_displacements(loaded.robot, unstack(q[rows]))
     places: list[str | Pose] = [loaded.support]
     places += [a if b is None else b for a, b in loaded.held if not isinstance(b, str)]
     poses = [x if isinstance(x, Pose) else T @ pose_in_base(loaded.robot, D, x) for x in places]

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.compliance.balance import ElasticBalance, Loaded
-from screwkin.compliance.equilibrium import SETTLED, Deflected, balances, equilibrium
+from screwkin.compliance.balance import ElasticBalance
+from screwkin.compliance.equilibrium import at_rest, balances
 from screwkin.compliance.laws import Spring
 from screwkin.compliance.springs import SpringChoice
 from screwkin.compliance.stiffness import loaded_robot
-from screwkin.errors import NoSolutionError, SingularError
+from screwkin.errors import SingularError
 from screwkin.kinematics.mass import GRAVITY
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
@@ -49,10 +49,10 @@ def cartesian_compliance(
         InputError, ShapeError, UnknownNameError, NoSolutionError: as for ``cartesian_stiffness``.
     """
     loaded, _, batch = loaded_robot(robot, state, support, stiffness, gravity, loads, springs)
-    solved = _at_rest(loaded)
+    theta, stable = at_rest(loaded)
     C = np.empty((len(loaded.q), 6, 6))
-    for rows, here in balances(loaded, solved.theta):
-        free = np.flatnonzero(~solved.stable[rows])
+    for rows, here in balances(loaded, theta):
+        free = np.flatnonzero(~stable[rows])
         if len(free):
             raise SingularError(
                 f"sample {rows[free[0]]}: {robot.name} moves freely in some direction, or is unstable, so "
@@ -108,9 +108,9 @@ def cartesian_stiffness(
     Source: paper B, eq. 15; Klimchik, Chablat and Pashkevich (2014).
     """
     loaded, _, batch = loaded_robot(robot, state, support, stiffness, gravity, loads, springs)
-    solved = _at_rest(loaded)
+    theta, _ = at_rest(loaded)
     K = np.empty((len(loaded.q), 6, 6))
-    for rows, here in balances(loaded, solved.theta):
+    for rows, here in balances(loaded, theta):
         B = here.columns(frame)
         mobility = B @ B.swapaxes(1, 2)
         scale = 1 / np.sqrt(np.maximum(np.diagonal(mobility, axis1=1, axis2=2), 1e-300))
@@ -130,14 +130,3 @@ def _without(here: ElasticBalance, B: Array, spring: Array) -> Array:
     """Stiffness (A, 6, 6) at a frame of columns B (A, 6, n): with a spring (A, 6) there, less the spring."""
     S, Bt = spring[:, :, None] * np.eye(6), B.swapaxes(1, 2)
     return np.asarray(np.linalg.inv(B @ np.linalg.solve(here.left + Bt @ S @ B, Bt)) - S)
-
-
-def _at_rest(loaded: Loaded) -> Deflected:
-    """The equilibrium, which every sample must have."""
-    solved = equilibrium(loaded)
-    lost = np.flatnonzero(~(solved.residual <= SETTLED))
-    if len(lost):
-        raise NoSolutionError(
-            f"sample {lost[0]}: there is no equilibrium of springs, weight and loads; raise the stiffness"
-        )
-    return solved

@@ -27,8 +27,8 @@ def compensate(
 ) -> Array:
     """Positions to command to elastic drives so that the joints stand at the state under their efforts.
 
-    Drive and joint are the ends of a spring: what its effort deflects it is added to the command. What bends
-    in links is not a joint's to undo; ``static_deflection`` says how far frames are from where they belong.
+    Drive and joint are the ends of a spring: what its effort deflects it is added to the command. The joints
+    then stand as they should, and frames beyond links that bend do not; ``elastic_commands`` undoes that too.
 
     Args:
         robot: n joints.
@@ -76,11 +76,16 @@ def compensate(
         deflection = xp.stack(xp.broadcast_arrays(*columns), axis=-1)
     commands: Array = q + deflection
     if not is_jax(commands):
-        _check_limits(robot, commands)
+        check_commands(robot, commands)
     return commands
 
 
-def _check_limits(robot: Robot, commands: Array) -> None:
+def check_commands(robot: Robot, commands: Array) -> None:
+    """Refuse commands (..., n) beyond limits.
+
+    Raises:
+        LimitError: names the joint that is farthest beyond.
+    """
     lower, upper = limits.limits_of(robot)
     if limits.within(commands, lower, upper).all():
         return

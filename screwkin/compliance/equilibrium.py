@@ -20,6 +20,7 @@ from screwkin.algebra.newton import newton, solved
 from screwkin.compiler.run import run
 from screwkin.compliance.balance import ElasticBalance, Loaded, elastic_balance, spring_slopes, stands
 from screwkin.compliance.deflection import linear, moved, newton_step
+from screwkin.errors import NoSolutionError
 
 SETTLED = 1e-12
 """Largest norm of theta + torque / k [rad or m] that counts as equilibrium."""
@@ -82,6 +83,12 @@ def _first_order_of_any(loaded: Loaded) -> Deflected:
 
 def equilibrium(loaded: Loaded) -> Deflected:
     """Deflections where springs, weight and loads are in balance; else the last ones tried."""
+    theta, residual, iterations, stable = _settled(loaded)
+    return Deflected(theta, *_moved(loaded, theta), residual, iterations, stable)
+
+
+def _settled(loaded: Loaded) -> tuple[Array, Array, Array, Array]:
+    """Deflections (B, n), residual, number of steps and whether the equilibrium is stable (B,)."""
     theta, residual, iterations, certified = _steps(loaded)
     stable = certified.copy()
     for rows in _blocks(~certified):
@@ -94,7 +101,22 @@ def equilibrium(loaded: Loaded) -> Deflected:
         result = newton(residual_of, np.zeros((len(rows), theta.shape[1])), TOLERANCE)
         theta[rows], residual[rows], iterations[rows] = result.x, result.residual, result.iterations
         stable[rows] = _definite(forces(result.x, np.arange(len(rows))))
-    return Deflected(theta, *_moved(loaded, theta), residual, iterations, stable)
+    return theta, residual, iterations, stable
+
+
+def at_rest(loaded: Loaded) -> tuple[Array, Array]:
+    """Deflections (B, n) in equilibrium, which every sample must have; and whether it is stable (B,).
+
+    Raises:
+        NoSolutionError: one has none.
+    """
+    theta, residual, _, stable = _settled(loaded)
+    lost = np.flatnonzero(~(residual <= SETTLED))
+    if len(lost):
+        raise NoSolutionError(
+            f"sample {lost[0]}: there is no equilibrium of springs, weight and loads; raise the stiffness"
+        )
+    return theta, stable
 
 
 def balances(loaded: Loaded, theta: Array) -> Iterator[tuple[Array, ElasticBalance]]:
