@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from screwkin.errors import Fault, GaitError
 from screwkin.gait.motion import Motion, along
 from screwkin.gait.path import path_of
 from screwkin.gait.record import Gait
-from screwkin.gait.splines import clamped_cubic, extremes, held_constant, minimum_jerk
+from screwkin.gait.splines import clamped_cubic, even_speed, extremes, held_constant, minimum_jerk
 from screwkin.gait.stance import LEFT, RIGHT, Stance
 
 _BELOW = 1e-9  # m: what rounding may put below the floor
@@ -93,7 +94,11 @@ def swing_splines(gait: Gait) -> tuple[Any, Any]:
     Raises:
         GaitError: the foot would go below the floor, or far above ``lift``.
     """
-    through = clamped_cubic if gait.swing == "cubic" else minimum_jerk
+    through: Any = {
+        "cubic": clamped_cubic,
+        "minimum-jerk": minimum_jerk,
+        "even": partial(even_speed, ease=gait.ease),
+    }[gait.swing]
     channels = (gait.channels[name] for name in ("foot_progress", "foot_height"))
     progress, height = (through(channel.at, channel.value) for channel in channels)
     at, value = extremes(height)

@@ -10,21 +10,27 @@ from screwkin.gait.motion import Function, Motion, along
 from screwkin.gait.path import path_of
 from screwkin.gait.preview import CartMotion
 from screwkin.gait.record import Gait
+from screwkin.gait.stance import LEFT, RIGHT, Stance
 
 
-def headings(gait: Gait, holds: tuple[Foothold, ...], steps: int) -> Array:
+def headings(gait: Gait, stance: Stance, holds: tuple[Foothold, ...], steps: int) -> Array:
     """Yaw of the waist at the boundaries of the steps (steps + 1,) [rad].
 
-    Along the path of the gait; over listed footholds the mean of those that the feet then stand on.
+    Along the path of the gait; over listed footholds the mean of those that the feet then stand on. From
+    there it turns by ``twist`` of the way to where the hips are in line with the feet.
     """
-    if not gait.places:
-        return np.arange(steps + 1.0) * path_of(gait).turn
-    stand = {hold.foot: hold.yaw for hold in holds[:2]}
-    means = [sum(stand.values()) / 2]
-    for hold in holds[2:]:
-        stand[hold.foot] = hold.yaw
-        means.append(sum(stand.values()) / 2)
-    return np.array(means)
+    stood = [{hold.foot: hold for hold in holds[: 2 + n]} for n in range(steps + 1)]
+    if gait.places:
+        ahead = np.array([sum(hold.yaw for hold in stand.values()) / 2 for stand in stood])
+    else:
+        ahead = np.arange(steps + 1.0) * path_of(gait).turn
+    if gait.twist == 0.0:
+        return ahead
+    right, left = (stance.foot(side).name for side in (RIGHT, LEFT))
+    way = np.array([[stand[left].x - stand[right].x, stand[left].y - stand[right].y] for stand in stood])
+    c, s = np.cos(ahead), np.sin(ahead)
+    aside, forward = c * way[:, 1] - s * way[:, 0], c * way[:, 0] + s * way[:, 1]
+    return np.asarray(ahead - gait.twist * np.arctan2(forward, aside))
 
 
 def levels(holds: tuple[Foothold, ...]) -> Array:

@@ -20,32 +20,25 @@ from functools import partial
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.algebra.se3 import as_array, pose_from_array, twist_from_array, unstack
-from screwkin.dynamics.newton_euler import Bodies, total_momentum
 from screwkin.dynamics.terrain import Terrain
-from screwkin.errors import Fault, GaitError, InputError, NoSolutionError
-from screwkin.gait.balance import ground_reaction
+from screwkin.errors import Fault, GaitError, InputError
 from screwkin.gait.footsteps import Foothold, footholds, swing_side
 from screwkin.gait.lead import at_home, led, samples_of, share_of_home
 from screwkin.gait.motion import Motion
 from screwkin.gait.over_feet import headings, levels, waist_over
 from screwkin.gait.plan import Plan, check_fitted, check_rate, plan_around, whole_steps
 from screwkin.gait.preview import CartMotion, follow_reference, preview_gains
-from screwkin.gait.realise import differentiate, positions
 from screwkin.gait.record import Gait
 from screwkin.gait.stance import Stance
 from screwkin.gait.steering import Steering
-from screwkin.kinematics.mass import mass_center
-from screwkin.kinematics.positions import link_displacements
+from screwkin.gait.tracking import Tracked, beyond_carts, cart_heights, com_along, com_over
 from screwkin.mechanism.mechanism import Mechanism
-from screwkin.model.robot import Robot
-from screwkin.model.state import State
 
 SETTINGS = ("dsp", "horizon", "Qe", "Qx", "R")
 """Numbers of a preview gait's file in ``[parameters]``."""
 
-TRACKED = 1e-9
-"""How closely the CoM follows its reference [m]."""
+PASSES = 3
+"""How often preview control is repeated for the ZMP of all links."""
 
 
 def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -> Plan:
@@ -76,7 +69,7 @@ def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -
     phase = _phase(time - more / gait.rate, gait.Tc, steps, stand)
     holds = footholds(gait, stance, steps)
     reference = zmp_reference(gait, stance, holds, steps, time[:count])
-    heading, level = headings(gait, holds, steps), levels(holds)
+    heading, level = headings(gait, stance, holds, steps), levels(holds)
     boundaries = gait.Tc * (np.arange(steps + 1.0) + stand) + more / gait.rate
     home = share_of_home(more, count, gait.rate)
 
@@ -92,19 +85,28 @@ def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -
     if gait.com == "true" or steering.axis is not None:
         rest = np.zeros((1, 2))
         standing = around(CartMotion(reference[:1], rest, rest, reference[:1]), slice(more, more + 1))
-        standing, q = _followed(mechanism, steering, standing, reference[:1])
-        heights, aside = _cart_heights(mechanism, steering, standing, q)
-    cart = _cart(gait, settings, heights, reference)
-    if ends:
+        standing, q = com_over(mechanism, steering, Tracked.of(mechanism, steering, standing), reference[:1])
+        heights, aside = cart_heights(mechanism, steering, standing, q)
+
+    def cart_along(reference: Array) -> CartMotion:
+        cart = _cart(gait, settings, heights, reference)
+        if not ends:
+            return cart
         start, end = (one.com if gait.com == "true" else one.waist for one in ends)
-        cart = led(cart, start, end, more, gait.rate)
+        return led(cart, start, end, more, gait.rate)
+
+    cart = cart_along(reference)
     if steering.axis is None:
         planned = around(cart)
     else:
         planned = steering.moved(around(_straight(cart)), (cart.com - cart.com[:1]) * (0, 1 / aside))
     if gait.com == "waist":
         return replace(planned, notes=("the waist is taken for the CoM",))
-    return _tracked(mechanism, steering, planned, cart)
+    now = com_along(mechanism, steering, Tracked.of(mechanism, steering, planned), cart)
+    for _ in range(PASSES if gait.model == "links" else 0):
+        beyond = beyond_carts(mechanism, now, heights, more)[more : more + count]
+        now = com_along(mechanism, steering, now, cart_along(reference - beyond))
+    return now.planned
 
 
 def _cart(
@@ -130,24 +132,6 @@ def _straight(cart: CartMotion) -> CartMotion:
     first = cart.com[:1] * (0, 1)
     ahead = [x * (1, 0) for x in (cart.com, cart.velocity, cart.acceleration, cart.zmp)]
     return CartMotion(ahead[0] + first, ahead[1], ahead[2], ahead[3] + first)
-
-
-def _cart_heights(
-    mechanism: Mechanism, steering: Steering, standing: Plan, q: Array
-) -> tuple[tuple[float, float], float]:
-    """Heights of carts with the robot's moments ahead and to the side; how the CoM moves aside with a lean.
-
-    A cart of mass m at height h has the angular momentum m h v about a point of the floor below it. Of a
-    robot that shifts, h is taken to be the height of its CoM; of one that leans, the sideways one follows
-    from its own momentum.
-    """
-    robot, height = mechanism.robot, _com(mechanism.robot, standing, q)[0, 2]
-    if steering.axis is None:
-        return (height, height), 1.0
-    pushed = steering.driven(standing, np.array([[0.0, 1.0]]), np.zeros((1, 2)))
-    h = _momentum(mechanism, pushed, q)
-    angular = np.cross(standing.T_world_base[0, :3, 3], h[0, 3:]) + h[0, :3]
-    return (height, float(-angular[0] / h[0, 4])), float(h[0, 4] / robot.mass)
 
 
 def zmp_reference(gait: Gait, stance: Stance, holds: tuple[Foothold, ...], steps: int, time: Array) -> Array:
@@ -257,65 +241,3 @@ def _phase(time: Array, Tc: float, steps: int, stand: float) -> Motion:
     value = np.clip(time / Tc - stand, 0.0, float(steps))
     moving = (value > 0) & (value < steps)
     return Motion(value, np.where(moving, 1 / Tc, 0.0), np.zeros_like(time))
-
-
-def _com(robot: Robot, planned: Plan, q: Array) -> Array:
-    """CoM of all links (T, 3) [m]."""
-    D = link_displacements(robot, unstack(q))
-    return np.asarray(as_array(pose_from_array(planned.T_world_base) @ mass_center(robot, D), (len(q),)))
-
-
-def _followed(mechanism: Mechanism, steering: Steering, planned: Plan, wanted: Array) -> tuple[Plan, Array]:
-    """The plan with its waist moved until the CoM stands over ``wanted`` (T, 2), and its joint positions."""
-    q = positions(mechanism, planned).state.q
-    share = _share(mechanism, steering, planned, q)
-    for _ in range(20):
-        error = wanted - _com(mechanism.robot, planned, q)[:, :2]
-        if np.abs(error).max() < TRACKED:
-            return planned, q
-        planned = steering.moved(planned, _solved(share, error))
-        q = positions(mechanism, planned, q).state.q
-    far = 1e3 * np.abs(error).max()
-    raise NoSolutionError(f"the waist cannot bring the CoM to its reference; {far:.2g} mm are missing")
-
-
-def _tracked(mechanism: Mechanism, steering: Steering, planned: Plan, cart: CartMotion) -> Plan:
-    """The plan whose CoM of all links follows the cart, in all three derivatives."""
-    planned, q = _followed(mechanism, steering, planned, cart.com)
-    share, none = _share(mechanism, steering, planned, q), np.zeros_like(cart.com)
-    velocity, _ = _com_rates(mechanism, planned, q)
-    planned = steering.driven(planned, _solved(share, cart.velocity - velocity), none)
-    _, acceleration = _com_rates(mechanism, planned, q)
-    return steering.driven(planned, none, _solved(share, cart.acceleration - acceleration))
-
-
-def _share(mechanism: Mechanism, steering: Steering, planned: Plan, q: Array) -> Array:
-    """How the CoM moves with the waist while the feet stay, (T, 2, 2): rates are linear in the waist's."""
-    none = np.zeros((len(q), 2))
-    rest, _ = _com_rates(mechanism, planned, q)
-    pushed = [_com_rates(mechanism, steering.driven(planned, none + e, none), q)[0] for e in np.eye(2)]
-    return np.stack([moved - rest for moved in pushed], axis=-1)
-
-
-def _solved(share: Array, wanted: Array) -> Array:
-    return np.asarray(np.linalg.solve(share, wanted[..., None])[..., 0])
-
-
-def _momentum(mechanism: Mechanism, planned: Plan, q: Array) -> Array:
-    """Momentum (T, 6) about the base origin, [angular; linear], with the joints that the plan asks for."""
-    qd = unstack(differentiate(mechanism, planned, State(planned.T_world_base, q)).qd)
-    bodies = Bodies.of(mechanism.robot, pose_from_array(planned.T_world_base).R, unstack(q))
-    h = total_momentum(bodies, qd, twist_from_array(planned.base_twist))
-    return np.hstack([as_array(part, (len(q),)) for part in (h.m, h.f)])
-
-
-def _com_rates(mechanism: Mechanism, planned: Plan, q: Array) -> tuple[Array, Array]:
-    """Velocity and acceleration of the CoM (T, 2), with the joints that the plan asks for."""
-    robot = mechanism.robot
-    motion = differentiate(mechanism, planned, State(planned.T_world_base, q))
-    T, qd = pose_from_array(planned.T_world_base), unstack(motion.qd)
-    h = total_momentum(Bodies.of(robot, T.R, unstack(q)), qd, twist_from_array(planned.base_twist))
-    velocity = as_array(h.f, (len(q),)) / robot.mass
-    twists = planned.base_twist, planned.base_acceleration
-    wrench = ground_reaction(robot, planned.T_world_base, q, motion.qd, motion.qdd, *twists)[2]
-    return velocity[:, :2], wrench[:, 3:5] / robot.mass

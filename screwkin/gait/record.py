@@ -17,18 +17,17 @@ from screwkin.dynamics.terrain import STEEPEST
 from screwkin.errors import Fault, GaitError, near
 from screwkin.gait.free_path import read_free_waist
 from screwkin.gait.keypoints import CHANNELS, Channel, channel_faults, increases, read_channel
-from screwkin.gait.keys import CHOICES, KEYS, NUMBERS, OPTIONAL, TEXTS
+from screwkin.gait.keys import AHEAD, CHOICES, KEYS, NUMBERS, OPTIONAL, RANGES, TEXTS
 from screwkin.gait.places import StepEnd, read_places
 from screwkin.gait.relative import FREE, NOMINAL, read_lengths, relative_to_robot
 from screwkin.gait.settings import place, valid_keys
 from screwkin.model.expression import names_in, resolve_parameters
 
 Kind = Literal["geometric", "preview", "footsteps"]
-Swing = Literal["cubic", "minimum-jerk"]
+Swing = Literal["minimum-jerk", "cubic", "even"]
 Footholds = Literal["alternate", "close", "parallel"]
 Side = Literal["right", "left"]
 
-_POSITIVE = ("Tc", "lift", "waist_height", "hand_drop", "rate")
 _TABLES = ("gait", "parameters", "channel", "waist", "lengths")
 _LISTED = "foothold"
 
@@ -47,9 +46,12 @@ class Gait:
     into the walk and out of it, 0 for none. footholds: ``alternate`` (each foot passes the other), ``close``
     (one leads, the other closes up) or ``parallel`` (as alternate, but from feet side by side to feet side by
     side); first: the foot that swings first. com: what a preview gait steers, the ``true`` CoM of all links
-    or, naively, the ``waist``. lateral: whether its waist ``shift``s to the side, or ``lean``s between the
-    hips, as legs without a roll axis at the ankle need it to keep their soles flat.
-    swing: spline of a swing. numbers: all of these and the file's own parameters. channels: key points.
+    or, naively, the ``waist``; model: whose ZMP it leads, a ``cart``'s or that of all ``links``. lateral:
+    whether its waist ``shift``s to the side, or ``lean``s between the hips, as legs without a roll axis at
+    the ankle need it to keep their soles flat. twist: share of the way by which the waist turns with each
+    step to where the hips are in line with the feet. swing: spline of a swing; ease: part of an ``even`` one
+    in which it speeds up, and again slows down. numbers: all of these and the file's own parameters.
+    channels: key points.
     waist: coefficients of a free waist path, or empty. places: where the steps of kind ``footsteps`` end.
     lengths: of the robot that it is fitted to [m]; empty before, when all that depends on them is NaN.
     """
@@ -74,6 +76,7 @@ class Gait:
     footholds: Footholds
     first: Side
     com: Literal["true", "waist"]
+    model: Literal["cart", "links"]
     lateral: Literal["shift", "lean"]
     arms: Literal["follow", "rest"]
     numbers: Mapping[str, float]
@@ -85,6 +88,8 @@ class Gait:
     upleft: float = 0.0
     roll: float = 0.0
     lead: float = 0.0
+    twist: float = 0.0
+    ease: float = 0.25
     path: str = ""
     _document: Mapping[str, Any] = field(default_factory=dict, repr=False)
 
@@ -154,7 +159,7 @@ def gait_from_dict(document: Mapping[str, Any], path: str = "<gait>") -> Gait:
     waist = read_free_waist(tables["waist"], faults)
     _check_complete(flat["kind"], channels, waist, tables["channel"], faults)
     open_ = frozenset() if lengths else relative_to_robot(_raw_numbers(flat, tables["parameters"]))
-    for key in OPTIONAL:
+    for key in AHEAD:
         if flat["kind"] == "geometric" and numbers.get(key):
             found = "key points alone lead the waist of a gait of kind 'geometric'"
             faults.append(Fault("[gait]", key, found, 'Take a gait of kind "preview" or "footsteps"'))
@@ -289,19 +294,19 @@ def _numbers(
         fault if fault.key in (*NUMBERS, *OPTIONAL) else _moved(fault, "[parameters]") for fault in wrong
     ]
     numbers = {name: None if value is None else float(value) for name, value in values.items()}
-    for key in (*_POSITIVE, "ramp", "roll", "lead"):
-        value, least = numbers.get(key), "above 0" if key in _POSITIVE else "at least 0"
-        known = lengths or key not in relative
-        if known and value is not None and (value < 0 or (value == 0 and key in _POSITIVE)):
-            faults.append(Fault("[gait]", key, f"{value:g} is not {least}", f"Give a number {least}"))
-            numbers[key] = None
-    for key in ("uphill", "upleft"):
-        value = numbers.get(key)
+    for name, within in ((name, key.within) for name, key in KEYS.items() if key.within):
+        value, known = numbers.get(name), lengths or name not in relative
+        if known and value is not None and not RANGES[within](value):
+            found = f"{value:g} is not {within}"
+            faults.append(Fault("[gait]", name, found, f"Give a number {within}"))
+            numbers[name] = None
+    for name in ("uphill", "upleft"):
+        value = numbers.get(name)
         if value is not None and abs(value) > STEEPEST:
             found = f"{value:g} rad is {math.degrees(value):.3g} deg"
             fix = f"A floor slopes by {math.degrees(STEEPEST):g} deg at most"
-            faults.append(Fault("[gait]", key, found, fix))
-            numbers[key] = None
+            faults.append(Fault("[gait]", name, found, fix))
+            numbers[name] = None
     steps = numbers.get("steps")
     if steps is not None and (steps < 1 or steps != round(steps)):
         faults.append(

@@ -1,4 +1,4 @@
-"""Splines through key points: clamped cubic, minimum-jerk, cyclic cubic without and with rests.
+"""Splines through key points: clamped cubic, minimum-jerk, even, cyclic cubic without and with rests.
 
 All are functions f(x, order) of the phase in steps, for the value (order 0) and its derivatives.
 """
@@ -39,12 +39,50 @@ def minimum_jerk(at: Array, value: Array) -> Any:
     """
     from scipy.interpolate import PPoly
 
-    step = np.diff(value)
-    turning = np.concatenate([[True], step[:-1] * step[1:] <= 0, [True]])
-    x, y = at[turning], value[turning]
+    x, y = _rests(at, value)
     h, rise = np.diff(x), np.diff(y)
     none = np.zeros_like(h)
     return PPoly(np.stack([6 * rise / h**5, -15 * rise / h**4, 10 * rise / h**3, none, none, y[:-1]]), x)
+
+
+def even_speed(at: Array, value: Array, ease: float) -> Any:
+    """From rest to rest at even speed, which comes and goes by cubics without a jump of accelerations.
+
+    Its greatest rate is 1 / (1 - ease) of the mean one; that of a minimum-jerk blend is 15/8. It rests where
+    that one does. A scipy PPoly.
+
+    Args:
+        at: key times (k,), increasing.
+        value: (k,).
+        ease: share of the time between two rests in which speed comes, and again in which it goes, above 0
+            and up to 1/2.
+    """
+    from scipy.interpolate import PPoly
+
+    x, y = _rests(at, value)
+    h, rise = np.diff(x), np.diff(y)
+    ramp, fast = ease * h, rise / ((1.0 - ease) * h)  # rates 3 u^2 - 2 u^3 of the fast one on the ramps
+    none = np.zeros_like(h)
+    bent, cubed = fast / (2 * ramp**3), fast / ramp**2
+    c = np.stack(
+        [
+            np.stack([-bent, cubed, none, none, y[:-1]]),
+            np.stack([none, none, none, fast, y[:-1] + fast * ramp / 2]),
+            np.stack([bent, -cubed, none, fast, y[1:] - fast * ramp / 2]),
+        ],
+        axis=-1,
+    )
+    begins = np.stack([x[:-1], x[:-1] + ramp, x[1:] - ramp], axis=-1).ravel()
+    c, begins = c.reshape(5, -1), np.append(begins, x[-1])
+    whole = np.diff(begins) > 0.0  # no even part is left where ease is 1/2
+    return PPoly(c[:, whole], np.append(begins[:-1][whole], x[-1]))
+
+
+def _rests(at: Array, value: Array) -> tuple[Array, Array]:
+    """Key points (j,) that are no mere passages, their value strictly between their neighbours' ones."""
+    step = np.diff(value)
+    resting = np.concatenate([[True], step[:-1] * step[1:] <= 0, [True]])
+    return at[resting], value[resting]
 
 
 def held_constant(spline: Any) -> Any:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from screwkin.gait.splines import (
     clamped_cubic,
     cyclic_cubic,
+    even_speed,
     extremes,
     held_constant,
     minimum_jerk,
@@ -50,7 +51,29 @@ def test_a_plateau_is_kept_by_resting_at_both_its_ends():
     assert spline(np.linspace(0.4, 0.6, 9)) == pytest.approx(np.ones(9))
 
 
-@pytest.mark.parametrize("make", [clamped_cubic, minimum_jerk])
+@given(
+    ease=st.floats(0.01, 0.5),
+    at=st.lists(st.floats(0.05, 2.0), min_size=2, max_size=5).map(np.cumsum),
+    rises=st.lists(st.floats(0.1, 3.0), min_size=4, max_size=4),
+)
+def test_an_even_swing_rests_at_its_ends_has_no_jump_and_the_speed_that_its_ease_says(ease, at, rises):
+    ways = np.array(rises[: len(at) - 1]) * (-1.0) ** np.arange(len(at) - 1)
+    value = np.concatenate([[0.5], 0.5 + np.cumsum(ways)])
+    spline = even_speed(at, value, ease)
+    assert spline(at) == pytest.approx(value, abs=1e-9)
+    for order in (1, 2):
+        assert spline(at, order) == pytest.approx(np.zeros(len(at)), abs=1e-6 / ease**2)
+    inner, step = spline.x[1:-1], 1e-9
+    for order, far in ((0, 1e-7), (1, 1e-6), (2, 1e-5)):
+        jump = spline(inner + step, order) - spline(inner - step, order)
+        assert np.abs(jump).max(initial=0.0) < far * (30.0 / 0.05 / ease) ** (order + 1)
+    for a, b, way in zip(at[:-1], at[1:], ways, strict=True):
+        speed = spline(np.linspace(a, b, 201), 1) * (b - a) / way
+        assert speed.max() == pytest.approx(1.0 / (1.0 - ease), rel=1e-9)
+        assert speed.min() > -1e-9
+
+
+@pytest.mark.parametrize("make", [clamped_cubic, minimum_jerk, lambda at, value: even_speed(at, value, 0.2)])
 def test_a_held_spline_is_exactly_constant_outside_its_swing(make):
     spline = held_constant(make(AT, UP + AT))
     before, after = np.linspace(0, 0.1, 11)[:-1], np.linspace(0.89, 1, 11)
