@@ -10,6 +10,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, norm, pose_from_array, rotation_from_array, rotation_log, unstack
+from screwkin.analysis.servo_shares import ServoShare, servo_shares
 from screwkin.errors import TableError, TrajectoryError
 from screwkin.files import text_sha256
 from screwkin.gait.balance import Balance, zmp
@@ -86,24 +87,29 @@ class Account:
         return steps if isinstance(steps, int) else None
 
     @cached_property
-    def speed_use(self) -> Mapping[str, float]:
-        """For every joint: its largest speed as a share of its limit; 0 where there is none."""
-        fastest = np.abs(self.trajectory.qd).max(axis=0)
-        return {
-            joint.name: float(speed / joint.velocity)
-            for joint, speed in zip(limited_joints(self.robot), fastest, strict=True)
-        }
+    def servos(self) -> Mapping[str, ServoShare]:
+        """For every joint: how much of its speed and torque the motion asks for."""
+        return servo_shares(self.robot, self.motion)
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What works on paper, but not on the servos or not for long."""
-        fast = [
-            f"{joint.name} {share * joint.velocity:.1f} of {joint.velocity:.1f} rad/s"
-            for joint in limited_joints(self.robot)
-            if (share := self.speed_use[joint.name]) > 1.0
-        ]
-        # In the words of a simulation's own warning, so that a page says it once.
-        noted = [f"planned joint speed above the servo's: {', '.join(fast)}"] if fast else []
+        fast, weak, beyond = [], [], []
+        for joint in limited_joints(self.robot):
+            share = self.servos[joint.name]
+            if share.speed > 1.0:
+                fast.append(f"{joint.name} {share.speed * joint.velocity:.1f} of {joint.velocity:.1f} rad/s")
+            if (share.torque or 0.0) > 1.0:
+                weak.append(f"{joint.name} {100 * (share.torque or 0.0):.0f} %")
+            elif (share.line or 0.0) > 1.0 >= share.speed:
+                beyond.append(f"{joint.name} {100 * (share.line or 0.0):.0f} % at {share.at:.2f} s")
+        # The first in the words of a simulation's own warning, so that a page says it once.
+        texts = (
+            (fast, "planned joint speed above the servo's"),
+            (weak, "planned joint torque above the servo's"),
+            (beyond, "more torque than the servo has at the planned speed"),
+        )
+        noted = [f"{text}: {', '.join(joints)}" for joints, text in texts if joints]
         gap = float(np.diff(self.trajectory.time).max())
         if gap > _COARSE:
             noted.append(f"samples are {gap:.3g} s apart; margins and spikes between them are not seen")

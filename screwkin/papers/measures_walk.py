@@ -173,7 +173,7 @@ BALANCE = {
     "samples": lambda one: one.trajectory.samples,
     "com_height": lambda one: one.balance.com[:, 2].mean(),
     "waist_height": lambda one: _path(one, "base")[:, 2].mean(),
-    "speed_use": lambda one: max(one.speed_use.values()),
+    "speed_use": lambda one: max(share.speed for share in one.servos.values()),
     "advance": lambda one: _path(one, "base")[-1, 0] - _path(one, "base")[0, 0],
 }
 """Numbers of a walk by name."""

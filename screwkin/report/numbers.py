@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -47,6 +48,7 @@ def walk_data(account: Account) -> dict[str, Any]:
         "limbs": {
             limb.limb: {"sigma": limb.sigma, "near": limb.near, "cause": limb.cause} for limb in account.limbs
         },
+        "servos": {name: asdict(share) for name, share in account.servos.items()},
         "warnings": list(account.warnings),
         "trajectory_sha256": trajectory.sha256,
     }
@@ -84,11 +86,21 @@ def walk_numbers(account: Account) -> list[Number]:
         limb = min(account.limbs, key=lambda limb: limb.sigma)
         at = f"{limb.limb} at {trajectory.time[limb.sample]:.2f} s; below 0.02 is near singular"
         rows.append(Number("least singular value", f"{limb.sigma:.3f}", at))
-    fastest = max(account.speed_use, key=lambda name: account.speed_use[name])
-    if account.speed_use[fastest] > 0:
-        rows.append(
-            Number("fastest joint", f"{100 * account.speed_use[fastest]:.0f} %", f"of its limit: {fastest}")
-        )
+    return rows + _servo_numbers(account)
+
+
+def _servo_numbers(account: Account) -> list[Number]:
+    """How near the plan takes servos to their speed, their torque and the line between these."""
+    rows = []
+    for what, key in (("fastest joint", "speed"), ("strongest joint", "torque"), ("nearest to both", "line")):
+        shares = {name: getattr(share, key) or 0.0 for name, share in account.servos.items()}
+        name = max(shares, key=lambda name: shares[name])
+        if shares[name] > 0:
+            of = "of its speed-torque line" if key == "line" else "of its limit"
+            when = f" at {account.servos[name].at:.2f} s" if key == "line" else ""
+            rows.append(Number(what, f"{100 * shares[name]:.0f} %", f"{of}: {name}{when}"))
+    if rows and all(share.torque is None for share in account.servos.values()):
+        rows.append(Number("torques", "unknown", "they do not follow from the motion alone"))
     return rows
 
 

@@ -66,7 +66,7 @@ def test_speeds_are_shares_of_the_servos_limits(robot, trajectory):
     knee = robot.joint_names.index("right_knee")
     qd[3, knee] = -9.0
     account = account_of(robot, replace(trajectory, qd=qd))
-    assert account.speed_use["right_knee"] == pytest.approx(9.0 / 6.0)
+    assert account.servos["right_knee"].speed == pytest.approx(9.0 / 6.0)
     assert "planned joint speed above the servo's: right_knee 9.0 of 6.0 rad/s" in account.warnings
 
 
@@ -80,6 +80,9 @@ def test_a_changed_zmp_is_noticed(robot, trajectory, account):
 
 def test_numbers_and_data_tell_the_same(account):
     data, numbers = walk_data(account), {n.name: n.value for n in walk_numbers(account)}
+    for name, key in (("fastest joint", "speed"), ("strongest joint", "torque"), ("nearest to both", "line")):
+        most = max(share[key] for share in data["servos"].values())
+        assert numbers[name] == f"{100 * most:.0f} %"
     assert numbers["smallest margin of the ZMP"] == f"{data['min_margin_mm']:.1f} mm"
     assert numbers["spikes of |GCoM - ZMP|"] == str(len(data["spikes"]))
     assert data["steps"] == 4
