@@ -210,7 +210,7 @@ def rotation_log(rotation: Rotation) -> Vector:
     Works through the quaternion whose largest component is computed first (Shepperd 1978); for symbols the
     branch of small rotations is taken, valid for |w| < pi.
     """
-    w, v = _quaternion(rotation)
+    w, v = unit_quaternion(rotation)
     n2 = dot(v, v)
     if is_symbolic(n2):
         return v * (2 * scalar.atanc(n2 / (w * w)) / w)
@@ -220,7 +220,7 @@ def rotation_log(rotation: Rotation) -> Vector:
     return v * scalar.where(fine, slope / scalar.where(fine, w, 1.0), 2 * scalar.atan2(n, w) / n)
 
 
-def _quaternion(rotation: Rotation) -> tuple[Scalar, Vector]:
+def unit_quaternion(rotation: Rotation) -> tuple[Scalar, Vector]:
     """Unit quaternion (w, v) with w >= 0, each component computed without cancellation.
 
     For symbols it is not unit, which saves roots: the logarithm needs only the ratio of v to w.

@@ -16,9 +16,9 @@ from screwkin.gait.record import Gait, gait_from_dict
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
 from screwkin.trajectory import Trajectory, load_trajectory
-from screwkin.viewer.film import check_film, record
+from screwkin.viewer.film import check_film, write_film
 from screwkin.viewer.server import HOST, PORT, serve
-from screwkin.viewer.session import Session, begun, planned, with_motion
+from screwkin.viewer.session import Session, begun, replanned, with_motion
 
 
 def view(
@@ -104,11 +104,11 @@ def _filmed(session: Session, what: str, film: Path, as_json: bool) -> int:
     """Film the motion of a session, planned first where it has none."""
     with progress_bar("film") as done:
         if session.track is None:
-            session = planned(session)
+            session = replanned(session)
         done(0.3)
         if session.track is None:
             raise InputError(f"{what}: there is no motion to film; {session.note or 'name a trajectory.npz'}")
-        path = record(session.robot, session.track, film)
+        path = write_film(session.robot, session.track, film)
     if as_json:
         print_json({"url": None, "robot": session.robot.name, "film": str(path)})
     else:

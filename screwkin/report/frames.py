@@ -19,7 +19,7 @@ from screwkin.report.style import Axes, Figure, joint_colours, new_figure
 from screwkin.sim.camera import Camera
 from screwkin.sim.render import pictures
 from screwkin.sim.run import Run
-from screwkin.viewer.scene import lines_of
+from screwkin.sim.solids import lines_of
 
 ROWS, COLUMNS = 2, 3
 GREY = "#8A8F98"

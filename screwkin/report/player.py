@@ -27,7 +27,8 @@ from screwkin.analysis.validate import Validation
 from screwkin.gait.ground import ground_of
 from screwkin.model.robot import Robot
 from screwkin.report.style import GCOM, PLAIN, ZMP
-from screwkin.viewer.scene import COARSE, pieces_of, size_of
+from screwkin.sim.solids import robot_size
+from screwkin.viewer.scene import COARSE, pieces_of
 
 UNIT = 1e-6
 """Of stored lengths and angles [m, rad]."""
@@ -134,7 +135,7 @@ def _robot(account: Account, packed: Packed) -> dict[str, Any]:
 
 def _shown_size(robot: Robot, account: Account) -> float:
     """What the camera's distance is measured in [m]: the robot's size or the height of its waist."""
-    return max(size_of(robot), float(account.trajectory.T_world_base[0, 2, 3]))
+    return max(robot_size(robot), float(account.trajectory.T_world_base[0, 2, 3]))
 
 
 def _numbers(vector: Any) -> list[float]:

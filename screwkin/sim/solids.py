@@ -1,4 +1,4 @@
-"""What pictures show of a robot: the triangles of its shapes, and the boxes of links without any."""
+"""What pictures show of a robot: the triangles of its shapes, and boxes or lines of links without any."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
+from screwkin.algebra.se3 import as_array
 from screwkin.dynamics.terrain import Terrain
 from screwkin.errors import InputError, MissingDependencyError, RobotRemark
 from screwkin.model.records import Link
@@ -41,6 +42,32 @@ class Solids:
 
     boxes: Part
     triangles: Part
+
+
+def robot_size(robot: Robot) -> float:
+    """How large a robot is [m]: the diagonal of the box around its joints, tips and centres of mass."""
+    points = [as_array(joint.screw.s0) for joint in robot.tree]
+    points += [as_array(limb.frame.p) for limb in robot.limbs]
+    points += [as_array(link.com) for link in robot.links if link.mass]
+    extent = np.ptp(np.array(points, dtype=float).reshape(-1, 3), axis=0) if points else np.zeros(3)
+    return float(np.linalg.norm(extent)) or 1.0
+
+
+def lines_of(robot: Robot, name: str) -> list[Array]:
+    """Ends (2, 3) [m] of the lines from a link's joint to the joints, closures and tips that it carries.
+
+    In the zero pose, in base axes; of the base link from its first joint.
+    """
+    ends = [as_array(joint.screw.s0) for joint in robot.tree if joint.parent == name]
+    ends += [as_array(limb.frame.p) for limb in robot.limbs if limb.link == name]
+    for closure in robot.closures:
+        ends += [as_array(closure.frame_a.p)] if closure.link_a == name else []
+        ends += [as_array(closure.frame_b.p)] if closure.link_b == name else []
+    if name in robot.joint_above:
+        start = as_array(robot.tree[robot.joint_above[name]].screw.s0)
+    elif ends:
+        start = ends[0]
+    return [np.stack([start, end]).astype(float) for end in ends if np.linalg.norm(end - start) > 1e-6]
 
 
 def solids_of(robot: Robot, cell: float) -> Solids:

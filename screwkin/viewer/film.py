@@ -26,7 +26,7 @@ def check_film(path: Path) -> None:
         raise InputError(f"--record {path}: films are written as GIF; name a file that ends in .gif")
 
 
-def record(robot: Robot, track: Track, path: Path, camera: Camera | None = None) -> Path:
+def write_film(robot: Robot, track: Track, path: Path, camera: Camera | None = None) -> Path:
     """Film a motion at its own speed.
 
     Args:

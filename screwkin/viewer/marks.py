@@ -12,7 +12,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array
 from screwkin.mechanism.mechanism import Mechanism
 from screwkin.model.robot import Robot
-from screwkin.viewer.scene import size_of
+from screwkin.sim.solids import robot_size
 
 AXIS = 0.09
 """Half the length that is drawn of a screw axis, in sizes of the robot."""
@@ -58,9 +58,9 @@ class Way:
         return np.stack([self.points, np.roll(self.points, -1, axis=0)], axis=1)
 
 
-def axes_of(robot: Robot) -> list[Axis]:
+def screw_axes(robot: Robot) -> list[Axis]:
     """The screw axes of all joints, about the point ``s0`` that the table names."""
-    half = AXIS * size_of(robot)
+    half = AXIS * robot_size(robot)
     axes = []
     for joint in robot.tree:
         s, s0 = (as_array(part).astype(float) for part in (joint.screw.s, joint.screw.s0))
@@ -71,7 +71,7 @@ def axes_of(robot: Robot) -> list[Axis]:
     return axes
 
 
-def frames_of(robot: Robot) -> list[PlacedFrame]:
+def placed_frames(robot: Robot) -> list[PlacedFrame]:
     """The base, the tips of the limbs and the table's further frames."""
     names = ["base", *robot.tip_names, *(frame.name for frame in robot.frames)]
     places = ((name, *robot.frame(name)) for name in names)
@@ -81,7 +81,7 @@ def frames_of(robot: Robot) -> list[PlacedFrame]:
     ]
 
 
-def way_of(mechanism: Mechanism, circuit: str, Ts: Array, T_world_base: Array) -> Way:
+def circuit_line(mechanism: Mechanism, circuit: str, Ts: Array, T_world_base: Array) -> Way:
     """The line of a circuit through its joints, and along its virtual chains from the floor and back.
 
     Args:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from threading import Lock
+from threading import Condition
 from typing import Any
 
 import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.viewer.controls import Slider, gait_sliders, joint_sliders
+from screwkin.viewer.guides import NO_CIRCUIT, circuits_of
 from screwkin.viewer.session import SPEEDS, Session
-from screwkin.viewer.stage import NO_CIRCUIT, circuits_of
 from screwkin.viewer.track import Track
 
 MARKS = {
@@ -22,26 +22,32 @@ MARKS = {
     "robot": "body",
     "follow": "go along with it",
 }
-_FAINT = 0.25  # s: how often numbers and sliders follow a motion that plays
+_POINTS = 240  # of the plot of the margin, at most: it is drawn anew several times a second
 
 
 class Mailbox:
     """What was asked for since one last looked, the latest value of each key; browsers write from threads."""
 
     def __init__(self) -> None:
-        self._lock, self._asked = Lock(), dict[str, object]()
+        self._some, self._asked = Condition(), dict[str, object]()
 
     def ask(self, key: str, value: object = True) -> None:
         """Ask for something; an older value of the same key that was not looked at yet is forgotten."""
-        with self._lock:
+        with self._some:
             if key == "play" and key in self._asked:
                 del self._asked[key]  # started and stopped again
             else:
                 self._asked[key] = value
+            self._some.notify()
 
-    def taken(self) -> dict[str, object]:
-        """What was asked for, in order; the mailbox is empty then."""
-        with self._lock:
+    def taken(self, patience: float = 0.0) -> dict[str, object]:
+        """What was asked for, in order; the mailbox is empty then.
+
+        Args:
+            patience: how long to wait for something [s].
+        """
+        with self._some:
+            self._some.wait_for(lambda: bool(self._asked), patience)
             asked, self._asked = self._asked, {}
         return asked
 
@@ -54,7 +60,6 @@ class Panel:
         self._joints: list[Any] = []
         self._track: Track | None = None
         self._plot: Any = None
-        self._since = 0.0
         gui.set_panel_label(session.robot.name)
         self._reading = gui.add_markdown(session.reading)
         self._note = gui.add_markdown("")
@@ -80,24 +85,13 @@ class Panel:
             circuits = circuits_of(session.robot)
             if circuits:
                 self._asking(gui.add_dropdown("circuit", (NO_CIRCUIT, *circuits)), "circuit")
-        self.show(session, 1.0)
+        self.show(session)
 
-    def show(self, session: Session, seconds: float) -> None:
-        """Say what the session says.
-
-        Args:
-            session: the present one.
-            seconds: since the last call.
-        """
-        self._since += seconds
+    def show(self, session: Session) -> None:
+        """Say what the session says."""
         if session.track is not self._track:
             self._put_up_motion(session)
-        label = "pause" if session.clock.playing else "play"
-        if self._play.label != label:
-            self._play.label = label
-        if session.clock.playing and self._since < _FAINT:
-            return
-        self._since = 0.0
+        self._play.label = "pause" if session.clock.playing else "play"
         self._reading.content = session.reading
         self._note.content = session.note
         self._time.value = session.clock.time
@@ -156,7 +150,8 @@ def _line(label: str, colour: str, width: float = 1.5) -> dict[str, Any]:
 
 def _plotted(track: Track, sample: int) -> tuple[Array, ...]:
     """Times, margin [mm], a needle where the motion is now, and the border of the support polygon."""
-    margin = np.nan_to_num(1e3 * track.margin, neginf=0.0)
+    every = np.arange(0, len(track.time), -(-len(track.time) // _POINTS))
+    margin = np.nan_to_num(1e3 * track.margin[every], neginf=0.0)
     needle = np.full(len(margin), min(0.0, margin.min()))
-    needle[sample] = max(margin.max(), 1.0)
-    return track.time, margin, needle, np.zeros(len(margin))
+    needle[np.abs(every - sample).argmin()] = max(margin.max(), 1.0)
+    return track.time[every], margin, needle, np.zeros(len(margin))

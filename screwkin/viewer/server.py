@@ -15,13 +15,18 @@ from typing import Any
 import numpy as np
 
 from screwkin.errors import InputError, needed_for
+from screwkin.sim.solids import robot_size
 from screwkin.viewer.panel import Mailbox, Panel
-from screwkin.viewer.session import Session, handled, later, planned
+from screwkin.viewer.session import Session, advanced, handled, replanned
 from screwkin.viewer.stage import Stage
 
 HOST, PORT = "127.0.0.1", 8080
 PERIOD = 1 / 40
 """Time between two pictures [s] while a motion plays."""
+READING = 0.25
+"""How often numbers, sliders and plots follow a motion that plays [s]."""
+REST = 0.5
+"""How long one waits for something to be asked for [s] where nothing moves."""
 
 
 def serve(
@@ -67,16 +72,14 @@ def serve(
 
 def _prepare(server: Any, session: Session) -> None:
     """Floor, light and the place from which one looks first."""
-    from screwkin.viewer.scene import size_of
-
-    size = size_of(session.robot)
+    size = robot_size(session.robot)
     middle = session.T_world_base[:3, 3] * np.array([1.0, 1.0, 0.6])
-    server.gui.configure_theme(control_layout="floating", show_logo=False, show_share_button=False)
+    server.gui.main_panel.dock_right()
+    server.gui.configure_theme(show_logo=False, show_share_button=False)
     server.scene.set_up_direction("+z")
     server.scene.configure_default_lights(cast_shadow=False)  # shadows cost most where no graphics card is
     server.scene.configure_environment_map(None)
     server.scene.add_light_ambient("/ambient", intensity=1.2)
-    middle = middle + size * np.array([0.25, 0.25, 0.0])  # the panel covers the right of the picture
     server.initial_camera.position = tuple(middle + size * np.array([1.2, -1.4, 0.6]))
     server.initial_camera.look_at = tuple(middle)
 
@@ -86,23 +89,29 @@ def _run(
 ) -> None:
     """Handle what is asked for, go on in time, draw; until interrupted."""
     if session.track is None and session.gait is not None:
-        session = planned(session)
-    before = time.monotonic()
+        session = replanned(session)
+    before, said = time.monotonic(), -np.inf
     drawn: Session | None = None
     while going_on():
+        asked = mailbox.taken(0.0 if session.clock.playing or drawn is None else REST)
         now = time.monotonic()
-        asked = mailbox.taken()
         for key, value in asked.items():
             what, _, name = key.partition(" ")
             if what == "mark":
                 stage.mark(name, bool(value))
             elif what == "circuit":
                 stage.circuit(str(value))
-        session = handled(later(session, now - before), asked)
+        session = handled(advanced(session, now - before), asked)
+        before = now
         if session is not drawn or asked:
+            speaks = bool(asked) or not session.clock.playing or now - said >= READING
             with server.atomic():
                 stage.show(session)
-            panel.show(session, now - before)
+                if speaks:
+                    stage.say(session)
+            if speaks:
+                said = now
+                panel.show(session)
             drawn = session
-        before = now
-        time.sleep(max(0.0, PERIOD - (time.monotonic() - now)))
+        if session.clock.playing:
+            time.sleep(max(0.0, PERIOD - (time.monotonic() - now)))

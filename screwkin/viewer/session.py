@@ -13,8 +13,8 @@ from screwkin.gait.record import Gait
 from screwkin.model.robot import Robot
 from screwkin.trajectory import Trajectory
 from screwkin.viewer.controls import dragged
-from screwkin.viewer.scene import displacements, standing
-from screwkin.viewer.track import Clock, Track, track_of
+from screwkin.viewer.scene import displacements, first_pose
+from screwkin.viewer.track import Playhead, Track, track_of
 
 SPEEDS = ("0.1", "0.25", "0.5", "1", "2")
 """How fast a motion may be played, of its own speed."""
@@ -28,6 +28,7 @@ class Session:
         robot: whose it is.
         T_world_base: (4, 4) of the pose that is shown.
         q: (n,) of the pose that is shown [rad or m].
+        Ts: (L, 4, 4), what carries every link's pieces into the world.
         gait: that its sliders change, if it walks.
         changes: of the gait by its sliders.
         steps: of the walk.
@@ -39,22 +40,18 @@ class Session:
     robot: Robot
     T_world_base: Array
     q: Array
+    Ts: Array
     gait: Gait | None = None
     changes: Mapping[str, float] = field(default_factory=dict)
     steps: int = 4
     track: Track | None = None
-    clock: Clock = field(default_factory=lambda: Clock(0.0))
+    clock: Playhead = field(default_factory=lambda: Playhead(0.0))
     note: str = ""
 
     @property
     def sample(self) -> int | None:
         """The sample of the motion that is shown; None without a motion."""
         return None if self.track is None else self.track.sample(self.clock.time)
-
-    @property
-    def Ts(self) -> Array:
-        """What carries every link's pieces into the world, (L, 4, 4)."""
-        return displacements(self.robot, self.T_world_base, self.q)
 
     @property
     def reading(self) -> str:
@@ -70,8 +67,8 @@ class Session:
 
 def begun(robot: Robot, gait: Gait | None = None, steps: int = 4) -> Session:
     """A robot as it stands, before any motion."""
-    T, q = standing(robot)
-    return Session(robot, T, q, gait=gait, steps=steps)
+    T, q = first_pose(robot)
+    return Session(robot, T, q, displacements(robot, T, q), gait=gait, steps=steps)
 
 
 def with_motion(session: Session, trajectory: Trajectory, note: str = "") -> Session:
@@ -80,18 +77,18 @@ def with_motion(session: Session, trajectory: Trajectory, note: str = "") -> Ses
     old = session.clock
     share = old.time / old.duration if old.duration else 0.0
     clock = replace(old, duration=track.duration, time=share * track.duration)
-    return shown(replace(session, track=track, clock=clock, note=note))
+    return at_playhead(replace(session, track=track, clock=clock, note=note))
 
 
-def shown(session: Session) -> Session:
+def at_playhead(session: Session) -> Session:
     """The session in the pose of its clock's time."""
     k, track = session.sample, session.track
     if k is None or track is None:
         return session
-    return replace(session, T_world_base=track.T_world_base[k], q=track.q[k])
+    return replace(session, T_world_base=track.T_world_base[k], q=track.q[k], Ts=track.Ts[k])
 
 
-def planned(session: Session, plan: Callable[..., Trajectory] | None = None) -> Session:
+def replanned(session: Session, plan: Callable[..., Trajectory] | None = None) -> Session:
     """The session with its gait planned anew; what cannot be planned is a note, and the motion stays.
 
     Args:
@@ -120,11 +117,11 @@ def _walked(robot: Robot, gait: Gait, steps: int) -> Trajectory:
     return walk(robot, gait) if gait.places else planned_walk(robot, fitted(gait, robot), steps)
 
 
-def later(session: Session, seconds: float) -> Session:
+def advanced(session: Session, seconds: float) -> Session:
     """The session so many seconds later."""
     if not session.clock.playing:
         return session
-    return shown(replace(session, clock=session.clock.after(seconds)))
+    return at_playhead(replace(session, clock=session.clock.after(seconds)))
 
 
 def handled(session: Session, asked: Mapping[str, object]) -> Session:
@@ -138,18 +135,18 @@ def handled(session: Session, asked: Mapping[str, object]) -> Session:
         if what == "play" and session.track is not None:
             session = replace(session, clock=session.clock.toggled())
         elif what == "time":
-            session = shown(replace(session, clock=session.clock.at(float(str(value)))))
+            session = at_playhead(replace(session, clock=session.clock.at(float(str(value)))))
         elif what == "speed":
             session = replace(session, clock=replace(session.clock, speed=float(str(value))))
         elif what == "home":
-            T, q = standing(session.robot)
-            session = replace(session, T_world_base=T, q=q, clock=_stopped(session.clock), note="")
+            T, q = first_pose(session.robot)
+            session = _posed(session, T, q)
         elif what == "joint":
             session = _with_joint(session, name, float(str(value)))
         elif what == "gait":
             changes[name] = float(str(value))
     if changes != dict(session.changes):
-        session = planned(replace(session, changes=changes))
+        session = replanned(replace(session, changes=changes))
     return session
 
 
@@ -160,8 +157,14 @@ def _with_joint(session: Session, joint: str, value: float) -> Session:
         q = dragged(session.robot, session.q, joint, value)
     except ScrewkinError as error:
         return replace(session, note=str(error))
-    return replace(session, q=np.asarray(q), note="")
+    return _posed(session, session.T_world_base, np.asarray(q))
 
 
-def _stopped(clock: Clock) -> Clock:
+def _posed(session: Session, T_world_base: Array, q: Array) -> Session:
+    """The session in another pose, where no motion goes on."""
+    Ts = displacements(session.robot, T_world_base, q)
+    return replace(session, T_world_base=T_world_base, q=q, Ts=Ts, clock=_stopped(session.clock), note="")
+
+
+def _stopped(clock: Playhead) -> Playhead:
     return replace(clock, playing=False)

@@ -94,7 +94,7 @@ def _on_ground(points: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Clock:
+class Playhead:
     """The time that is shown [s], whether it runs, how fast, and where it ends [s]."""
 
     duration: float
@@ -102,19 +102,19 @@ class Clock:
     playing: bool = False
     speed: float = 1.0
 
-    def after(self, seconds: float) -> Clock:
+    def after(self, seconds: float) -> Playhead:
         """The clock so many seconds later; it stops at its end."""
         if not self.playing:
             return self
         time = self.time + self.speed * seconds
         return replace(self, time=min(time, self.duration), playing=time < self.duration)
 
-    def toggled(self) -> Clock:
+    def toggled(self) -> Playhead:
         """Started, from the beginning if it stood at its end; or stopped."""
         if self.playing:
             return replace(self, playing=False)
         return replace(self, playing=True, time=0.0 if self.time >= self.duration else self.time)
 
-    def at(self, time: float) -> Clock:
+    def at(self, time: float) -> Playhead:
         """The same at another time, within its duration."""
         return replace(self, time=min(max(time, 0.0), self.duration))

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 import screwkin as sk
 from screwkin.algebra.se3 import as_array
-from screwkin.viewer.marks import axes_of, frames_of, way_of
-from screwkin.viewer.scene import displacements, pieces_of, standing
+from screwkin.viewer.marks import circuit_line, placed_frames, screw_axes
+from screwkin.viewer.scene import displacements, first_pose, pieces_of
 
 EVERY = sk.robot_names()
 
@@ -44,10 +44,10 @@ def test_carried_frames_are_those_of_the_library_and_joints_hold_their_links_tog
     T = np.tile(np.eye(4), (2, 1, 1))
     T[:, :3, 3] = draw.normal(size=(2, 3))
     Ts = displacements(robot, T, q)
-    for frame in frames_of(robot):
+    for frame in placed_frames(robot):
         expected = sk.frame_pose(robot, sk.State(T, q), frame.name)
         assert np.allclose(Ts[:, frame.link] @ frame.pose, expected, atol=1e-12)
-    for axis, joint in zip(axes_of(robot), robot.tree, strict=True):
+    for axis, joint in zip(screw_axes(robot), robot.tree, strict=True):
         below, above = (Ts[:, robot.link_names.index(link)] for link in (joint.child, joint.parent))
         assert axis.slides == (joint.type == "prismatic")
         way = np.diff(axis.ends, axis=0)[0]
@@ -61,10 +61,10 @@ def test_carried_frames_are_those_of_the_library_and_joints_hold_their_links_tog
 def test_a_circuit_is_a_closed_line_through_its_joints_and_to_its_tip(name):
     robot = sk.load_robot(name)
     mechanism = sk.closed_mechanism(robot)
-    T, q = standing(robot)
+    T, q = first_pose(robot)
     Ts = displacements(robot, T, q)
     for circuit, row in zip(mechanism.circuit_names, mechanism.circuits, strict=True):
-        way = way_of(mechanism, circuit, Ts, T)
+        way = circuit_line(mechanism, circuit, Ts, T)
         assert way.legs.shape == (len(way.points), 2, 3)
         assert np.linalg.norm(np.diff(way.legs, axis=1), axis=-1).min() > 0.0
         places = {joint.name: joint for joint in robot.tree if joint.name in row}

@@ -11,9 +11,9 @@ import screwkin as sk
 from screwkin.errors import NoSolutionError
 from screwkin.gait.balance import soles_on_floor
 from screwkin.viewer.controls import dragged, gait_sliders, joint_sliders
-from screwkin.viewer.scene import standing
-from screwkin.viewer.session import begun, handled, later, planned, with_motion
-from screwkin.viewer.track import Clock, track_of
+from screwkin.viewer.scene import first_pose
+from screwkin.viewer.session import advanced, begun, handled, replanned, with_motion
+from screwkin.viewer.track import Playhead, track_of
 from tests.analysis.conftest import robot, trajectory
 
 __all__ = ["robot", "trajectory"]
@@ -23,7 +23,7 @@ times = st.floats(0.0, 20.0)
 
 @given(duration=st.floats(0.1, 10.0), start=times, first=times, second=times, speed=st.floats(0.1, 2.0))
 def test_a_clock_stays_within_its_motion_and_time_adds_up(duration, start, first, second, speed):
-    clock = replace(Clock(duration).at(start), playing=True, speed=speed)
+    clock = replace(Playhead(duration).at(start), playing=True, speed=speed)
     assert 0.0 <= clock.time <= duration
     once, twice = clock.after(first + second), clock.after(first).after(second)
     assert once.time == pytest.approx(twice.time, rel=1e-9)
@@ -39,7 +39,7 @@ def test_a_clock_stays_within_its_motion_and_time_adds_up(duration, start, first
 @given(name=st.sampled_from(LOOPED), by=st.floats(-0.02, 0.02), which=st.integers(0, 2))
 def test_dragging_a_joint_keeps_every_loop_closed(name, by, which):
     linkage = sk.load_robot(name)
-    _, q = standing(linkage)
+    _, q = first_pose(linkage)
     joint = linkage.joint_names[which]
     moved = dragged(linkage, q, joint, q[which] + by)
     assert moved[which] == pytest.approx(q[which] + by, abs=1e-9)
@@ -71,7 +71,7 @@ def test_a_linkage_that_cannot_follow_says_so_and_stays():
 
 
 def test_sliders_span_the_limits_and_contain_where_the_robot_is(robot):
-    _, q = standing(robot)
+    _, q = first_pose(robot)
     for joint, slider, value in zip(robot.joints, joint_sliders(robot, q), q, strict=True):
         assert slider.lower <= value <= slider.upper
         assert (slider.lower, slider.upper) == (joint.lower, joint.upper)
@@ -111,12 +111,12 @@ def test_the_zmp_lies_in_the_polygon_that_is_drawn_as_deep_as_the_margin_says(ro
 
 def test_playing_goes_on_in_time_and_a_dragged_joint_stops_it(robot, trajectory):
     session = handled(with_motion(begun(robot), trajectory), {"speed": "0.5", "play": True})
-    session = later(session, 1.0)
+    session = advanced(session, 1.0)
     assert session.clock.time == pytest.approx(0.5)
     stopped = handled(session, {"joint right_knee": 0.7})
     assert not stopped.clock.playing
     assert stopped.q[robot.joint_names.index("right_knee")] == 0.7
-    assert np.array_equal(handled(stopped, {"home": True}).q, standing(robot)[1])
+    assert np.array_equal(handled(stopped, {"home": True}).q, first_pose(robot)[1])
 
 
 def test_a_gait_is_planned_once_for_all_that_was_changed_and_goes_on_where_it_was(robot, trajectory):
@@ -126,7 +126,7 @@ def test_a_gait_is_planned_once_for_all_that_was_changed_and_goes_on_where_it_wa
         plans.append((gait.numbers["stride"], gait.numbers["Tc"], steps))
         return trajectory
 
-    session = planned(begun(robot, sk.load_gait("paper"), 3), plan)
+    session = replanned(begun(robot, sk.load_gait("paper"), 3), plan)
     session = handled(session, {"time": 2.0})
     share = session.clock.time / session.clock.duration
     import screwkin.gait.walk as module
@@ -151,4 +151,4 @@ def test_without_a_motion_nothing_plays(robot):
     assert session.reading == "no motion yet"
     assert not handled(session, {"play": True}).clock.playing
     assert handled(session, {"time": 1.0}).sample is None
-    assert planned(session) is session
+    assert replanned(session) is session

@@ -1,5 +1,6 @@
 """Scene and panel on a server that only writes down what it is asked for."""
 
+from collections import Counter
 from types import SimpleNamespace
 from unittest.mock import MagicMock
 
@@ -7,14 +8,24 @@ import numpy as np
 import pytest
 
 import screwkin as sk
-from screwkin.viewer.film import record
+from screwkin.viewer.film import write_film
+from screwkin.viewer.guides import circuits_of
 from screwkin.viewer.panel import Mailbox, Panel
-from screwkin.viewer.session import begun, handled, with_motion
-from screwkin.viewer.stage import Stage, circuits_of
+from screwkin.viewer.session import advanced, begun, handled, with_motion
+from screwkin.viewer.stage import Stage
 from screwkin.viewer.track import track_of
 from tests.analysis.conftest import robot, trajectory
 
 __all__ = ["robot", "trajectory"]
+
+
+class Handle(MagicMock):
+    """A node or a widget; ``sent`` counts what was assigned to it by name."""
+
+    def __setattr__(self, name, value):
+        if name in ("position", "wxyz", "vertices", "text"):
+            self.__dict__.setdefault("sent", Counter())[name] += 1
+        super().__setattr__(name, value)
 
 
 class Written:
@@ -25,7 +36,7 @@ class Written:
 
     def __getattr__(self, name):
         def add(label="", *values, **options):
-            handle = MagicMock(points=np.zeros((1, 2, 3)), label=label, values=values, options=options)
+            handle = Handle(label=label, values=values, options=options)
             handle.add_tab.return_value.__enter__ = lambda s: None
             if name == "add_slider":
                 handle.min, handle.max, *_ = values
@@ -61,21 +72,62 @@ def test_the_scene_follows_the_motion(robot, trajectory):
         assert np.allclose(scene.handles[f"/world/robot/{link.name}"].position, T[:3, 3])
     assert np.allclose(scene.handles["/world/motion/ZMP"].position[:2], trajectory.zmp[k])
     x, y = 1e3 * trajectory.zmp[k]
+    stage.say(session)
     assert scene.handles["/world/motion/ZMP/label"].text == f"ZMP {x:.0f}, {y:.0f} mm"
-    polygon = scene.handles["/world/motion/polygon"].points
-    assert np.allclose(polygon[:, 0, :2], track.polygon(k)[:, :2])
+    border = scene.handles["/world/motion/polygon"].vertices.reshape(-1, 8, 3)  # a bar for every edge
+    assert np.allclose(border[:, :4].mean(axis=1), track.polygon(k), atol=1e-6)
     stage.mark("feet", False)
+    stage.show(session)
     assert scene.handles["/world/motion/polygon"].visible is False
     stage.mark("follow", False)
     stage.show(session)
     assert np.array_equal(scene.handles["/world"].position, np.zeros(3))
     stage.circuit("left_leg")
     stage.show(session)
-    assert scene.handles["/world/circuit"].values[0].shape[1:] == (2, 3)
-    lit = scene.handles["/world/circuit"]
+    lit = [scene.handles[f"/world/circuit/{kind}"] for kind in ("real", "virtual")]
+    assert all(len(handle.vertices) for handle in lit)
     stage.circuit("none")
     stage.show(session)
-    lit.remove.assert_called_once_with()
+    for handle in lit:
+        handle.remove.assert_called_once_with()
+
+
+def test_only_what_has_changed_is_sent(robot, trajectory):
+    scene = Written()
+    session = handled(with_motion(begun(robot), trajectory), {"play": True})
+    stage = Stage(scene, session)
+    stage.show(session)
+    links = [scene.handles[f"/world/robot/{link.name}"] for link in robot.links]
+    border = scene.handles["/world/motion/polygon"]
+    before = [handle.sent.total() for handle in (*links, border)]
+    stage.show(session)
+    assert [handle.sent.total() for handle in (*links, border)] == before, "nothing moved"
+    shows, polygons = 0, {session.track.polygon(session.sample).tobytes()}
+    while session.clock.playing:
+        session = advanced(session, 1 / 40)
+        stage.show(session)
+        shows += 1
+        polygons.add(session.track.polygon(session.sample).tobytes())
+    assert shows > 100
+    assert len(polygons) <= border.sent["vertices"] < shows / 10, "drawn anew where it is another"
+    assert "text" not in scene.handles["/world/motion/ZMP/label"].sent, "numbers are written apart"
+
+
+def test_what_is_not_asked_for_is_not_put_up_and_lines_are_few_triangles(robot, trajectory):
+    scene = Written()
+    session = with_motion(begun(robot), trajectory)
+    stage = Stage(scene, session)
+    stage.show(session)
+    assert not [name for name in scene.handles if "/axis" in name or "/frame " in name or "circuit" in name]
+    assert len(scene.handles) < 2 * len(robot.links) + 20
+    lines = [scene.handles[f"/world/motion/{name} trace"] for name in ("ZMP", "GCoM", "CoM")]
+    assert sum(len(handle.values[1]) for handle in (*lines, scene.handles["/world/floor"])) < 2500
+    stage.mark("axes", True)
+    assert len([name for name in scene.handles if name.endswith("/name")]) == len(robot.tree)
+    stage.mark("axes", False)
+    put_up = dict(scene.handles)
+    stage.mark("axes", True)
+    assert scene.handles == put_up, "put up once"
 
 
 def test_widgets_ask_only_for_what_a_person_did(robot, trajectory):
@@ -84,7 +136,7 @@ def test_widgets_ask_only_for_what_a_person_did(robot, trajectory):
     panel = Panel(gui, session, mailbox)
     assert gui.handles["play"].disabled
     session = with_motion(session, trajectory)
-    panel.show(session, 1.0)
+    panel.show(session)
     assert not gui.handles["play"].disabled
     assert gui.handles["time [s]"].max == pytest.approx(trajectory.duration)
     stride = gui.handles["stride [m]"]
@@ -94,7 +146,7 @@ def test_widgets_ask_only_for_what_a_person_did(robot, trajectory):
     asked(SimpleNamespace(client="one", target=SimpleNamespace(value=0.03)))
     assert mailbox.taken() == {"gait stride": 0.03}
     gui.handles["play"].on_click.call_args.args[0](None)
-    panel.show(handled(session, mailbox.taken()), 0.0)
+    panel.show(handled(session, mailbox.taken()))
     assert gui.handles["play"].label == "pause"
 
 
@@ -109,6 +161,6 @@ def test_a_film_lasts_as_long_as_the_motion(robot, trajectory, tmp_path):
 
     track = track_of(robot, trajectory)
     camera = Camera(pictures=4, width=60, height=50)
-    with Image.open(record(robot, track, tmp_path / "walk.gif", camera)) as film:
+    with Image.open(write_film(robot, track, tmp_path / "walk.gif", camera)) as film:
         assert film.n_frames == 4
         assert film.info["duration"] == pytest.approx(1000 * trajectory.duration / 3, abs=10)
