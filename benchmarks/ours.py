@@ -20,7 +20,7 @@ from screwkin.compiler.records import identifier
 from screwkin.compiler.run import machine_code, python_function
 from screwkin.compiler.run import run as kernel
 from screwkin.dynamics import quantities
-from screwkin.gait.balance import ground_reaction
+from screwkin.dynamics.on_floor import ground_reaction
 from screwkin.ik import programs as limbs
 from screwkin.mechanism.tip_motion import motion_program
 from screwkin.model.robot import Robot

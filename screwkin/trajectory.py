@@ -19,8 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
+from screwkin.algebra.fields import flags_field, json_field, names_field, numbers_field
 from screwkin.algebra.hermite import hermite, places
 from screwkin.algebra.se3 import as_array, rotation_exp, rotation_from_array, rotation_log
+from screwkin.dynamics.standing import stood
 from screwkin.errors import InputError, TrajectoryError, expect
 from screwkin.files import (
     atomic_write,
@@ -31,9 +33,11 @@ from screwkin.files import (
     read_json,
     read_npz,
     ros_text,
+    versions,
 )
 from screwkin.kinematics.rigid import foreign
 from screwkin.model.display import html_table, listing
+from screwkin.model.recorded import robot_record
 from screwkin.model.robot import Robot
 
 TIP_PREFIX = "T_world_"
@@ -90,7 +94,7 @@ class Trajectory:
         faults: list[str] = []
         expect(self.T_world_tip, Mapping, "T_world_tip", "poses (T, 4, 4) by the name of their tip")
         for name in ("joint_names", "feet"):
-            object.__setattr__(self, name, _names(name, getattr(self, name), faults))
+            object.__setattr__(self, name, names_field(name, getattr(self, name), faults))
         sizes = {
             "T": len(np.atleast_1d(self.time)),
             "n": len(self.joint_names),
@@ -101,19 +105,54 @@ class Trajectory:
         }
         for name, axes in _SHAPES.items():
             shape = tuple(sizes[axis] for axis in axes)
-            object.__setattr__(self, name, _numbers(name, getattr(self, name), shape, faults))
+            object.__setattr__(self, name, numbers_field(name, getattr(self, name), shape, faults))
         tips = {
-            tip: _numbers(TIP_PREFIX + tip, pose, (sizes["T"], 4, 4), faults)
+            tip: numbers_field(TIP_PREFIX + tip, pose, (sizes["T"], 4, 4), faults)
             for tip, pose in self.T_world_tip.items()
         }
         object.__setattr__(self, "T_world_tip", MappingProxyType(tips))
         shape = (sizes["T"], len(self.feet))
-        object.__setattr__(self, "contact", _flags("contact", self.contact, shape, faults))
-        object.__setattr__(self, "meta", _json_data(self.meta, faults))
+        object.__setattr__(self, "contact", flags_field("contact", self.contact, shape, faults))
+        object.__setattr__(self, "meta", json_field(self.meta, faults))
         if not faults:
             faults += _inconsistencies(self)
         if faults:
             raise TrajectoryError("; ".join(faults))
+
+    @classmethod
+    def from_joints(cls, robot: Robot, time: Any, q: Any, contact: Any = None) -> Trajectory:
+        """A motion of joints from elsewhere on the floor: base, feet and ZMP follow from it.
+
+        Feet in contact are taken to stand flat, as at home, and still on a level floor; rates are those of
+        the cubic spline through the positions. The motion begins with the middle of its feet over the origin.
+
+        Args:
+            robot: of n joints, with legs, soles and a ``home`` posture; no closures.
+            time: (T,) [s], increasing.
+            q: (T, n) [rad or m], in the order of ``robot.joint_names``.
+            contact: (T, feet) bool, which legs' tips stand, in the order of its limbs; default: those with
+                the lowest sole, to 0.1 mm.
+
+        Returns:
+            Trajectory; its notes say how far the base jumps where feet that stand contradict each other.
+
+        Raises:
+            TrajectoryError: shapes or values of the arrays. InputError: the robot has no legs, soles or home,
+                or closures; a sample in which no foot stands.
+
+        Example:
+            >>> import screwkin as sk
+            >>> robot = sk.load_robot(sk.robot_names()[0])
+            >>> walk = sk.walk(robot, sk.load_gait("walk"), steps=1)
+            >>> again = sk.Trajectory.from_joints(robot, walk.time, walk.q)
+            >>> round(float(again.T_world_base[-1, 0, 3] - again.T_world_base[0, 0, 3]), 3)
+            0.1
+        """
+        expect(robot, Robot, "robot", 'load_robot("NAME")')
+        moved = stood(robot, time, q, contact)
+        record, made_by = robot_record(robot), versions("numpy", "scipy", "screwkin")
+        meta = {"robot": record, "notes": list(moved.notes), "versions": made_by}
+        return cls(joint_names=robot.joint_names, meta=meta, **moved.fields)
 
     def __reduce__(self) -> Any:
         """For pickles and copies: constructed anew, checked, with read-only arrays of its own."""
@@ -231,7 +270,10 @@ def load_trajectory(path: str | Path) -> Trajectory:
     expect(path, (str, Path), "path", "the path of an .npz file")
     path = Path(path)
     if path.suffix in (".csv", ".json"):
-        raise TrajectoryError(f"{path}: a {path.suffix} file holds the joints only; give the .npz beside it")
+        raise TrajectoryError(
+            f"{path}: a {path.suffix} file holds the joints only; give the .npz beside it, or make one:"
+            f" screwkin zmp {path} --robot NAME -o DIR"
+        )
     try:
         data = read_file(path)
         trajectory = _from_arrays(read_npz(data))
@@ -284,52 +326,6 @@ def sha256_of(path: str | Path) -> str:
         raise TrajectoryError(f"{path}: cannot be read: {error.strerror}") from None
     except InputError as error:
         raise TrajectoryError(f"{path}: {error}") from None
-
-
-def _numbers(name: str, value: Any, shape: tuple[int, ...], faults: list[str]) -> Array:
-    """A read-only float64 copy."""
-    array = np.asarray(value)
-    if array.dtype.kind not in "fiu":
-        faults.append(f"{name} has dtype {array.dtype}, expected float64")
-    elif array.shape != shape:
-        faults.append(f"{name} has shape {array.shape}, expected {shape}")
-    elif not np.isfinite(array).all():
-        row = int(np.argwhere(~np.isfinite(array))[0][0])
-        faults.append(f"{name} holds NaN or infinity, first in sample {row}")
-    else:
-        array = np.array(array, dtype=np.float64)
-        array.flags.writeable = False
-    return array
-
-
-def _flags(name: str, value: Any, shape: tuple[int, ...], faults: list[str]) -> NDArray[np.bool_]:
-    array = np.array(value)
-    if array.dtype != np.bool_:
-        faults.append(f"{name} has dtype {array.dtype}, expected bool")
-    elif array.shape != shape:
-        faults.append(f"{name} has shape {array.shape}, expected {shape}")
-    array.flags.writeable = False
-    return array
-
-
-def _names(name: str, value: Any, faults: list[str]) -> tuple[str, ...]:
-    array = np.asarray(value)
-    if array.ndim != 1 or (array.size and array.dtype.kind != "U"):
-        faults.append(f"{name} has dtype {array.dtype} and shape {array.shape}, expected a row of names")
-        return ()
-    names = tuple(array.tolist())
-    if len(set(names)) < len(names):
-        faults.append(f"{name} repeats a name: {', '.join(names)}")
-    return names
-
-
-def _json_data(meta: Any, faults: list[str]) -> Mapping[str, Any]:
-    try:
-        data = read_json(json.dumps(dict(meta), allow_nan=False))
-    except (TypeError, ValueError, RecursionError) as error:
-        faults.append(f"meta is not JSON data: {error}")
-        data = {}
-    return MappingProxyType(data)
 
 
 def _inconsistencies(trajectory: Trajectory) -> list[str]:

@@ -9,8 +9,8 @@ import numpy as np
 import screwkin as sk
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import twist_from_array
+from screwkin.dynamics.on_floor import ground_margin, ground_reaction, soles_on_floor
 from screwkin.files import text_sha256
-from screwkin.gait.balance import ground_margin, ground_reaction, soles_on_floor
 from screwkin.mechanism.joint_motion import joint_motion
 from screwkin.model.robot import Robot, robot_text
 

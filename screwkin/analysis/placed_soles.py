@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
+from screwkin.dynamics.on_floor import soles_on_floor
 from screwkin.dynamics.support import convex_hull
-from screwkin.gait.balance import soles_on_floor
 from screwkin.gait.ground import ground_of
 
 if TYPE_CHECKING:  # whoever has no account need not load what makes one

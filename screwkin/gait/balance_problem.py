@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from screwkin.algebra.arrays import Array
+from screwkin.dynamics.on_floor import soles_on_floor
 from screwkin.dynamics.support import convex_hull
 from screwkin.errors import UnknownNameError
-from screwkin.gait.balance import soles_on_floor
 from screwkin.gait.record import Gait
 from screwkin.gait.waist_layout import Layout
 from screwkin.gait.walk import walk

@@ -13,8 +13,8 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, pose_from_array, twist_from_array, unstack
 from screwkin.dynamics.newton_euler import Bodies, total_momentum
+from screwkin.dynamics.on_floor import ground_reaction
 from screwkin.errors import NoSolutionError
-from screwkin.gait.balance import ground_reaction
 from screwkin.gait.plan import Plan
 from screwkin.gait.preview import CartMotion
 from screwkin.gait.realise import differentiate, positions

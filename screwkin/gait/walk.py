@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 
 import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, pose_from_array, unstack
+from screwkin.dynamics.on_floor import ground_margin, ground_reaction, soles_on_floor
 from screwkin.errors import NoSolutionError, expect
-from screwkin.files import text_sha256, versions
-from screwkin.gait.balance import ground_margin, ground_reaction, soles_on_floor
+from screwkin.files import versions
 from screwkin.gait.follow import Followed, follow
 from screwkin.gait.lengths import fitted
 from screwkin.gait.listed import Footsteps, closed, with_footsteps
@@ -21,8 +20,8 @@ from screwkin.gait.record import Gait
 from screwkin.gait.remedy import with_remedy
 from screwkin.gait.stance import stance_of
 from screwkin.kinematics.positions import link_displacements, pose_in_base
-from screwkin.model.library import ROBOTS, data_folder
-from screwkin.model.robot import Robot, robot_text
+from screwkin.model.recorded import robot_record
+from screwkin.model.robot import Robot
 from screwkin.trajectory import Trajectory
 
 TRACED = ("numpy", "scipy", "screwkin")
@@ -86,7 +85,7 @@ def planned_walk(robot: Robot, gait: Gait, steps: int, command: str = "") -> Tra
         UnreachableError, SingularError, LimitError: names limb, sample and time.
         GaitError, InputError: the gait does not fit the robot.
     """
-    table = robot_text(robot)
+    record = robot_record(robot)
     done = follow(robot, gait, steps)
     drive, planned = done.drive, done.planned
     q = drive.positions(done.solution.state.q)
@@ -112,12 +111,7 @@ def planned_walk(robot: Robot, gait: Gait, steps: int, command: str = "") -> Tra
         zmp=zmp,
         margin=ground_margin(zmp, com, wrench, soles, planned.contact),
         meta={
-            "robot": {
-                "name": robot.name,
-                "table": table,
-                "sha256": text_sha256(table),
-                "path": _table_file(robot),
-            },
+            "robot": record,
             "gait": gait.to_dict(),
             "steps": steps,
             "boundaries": planned.boundaries.tolist(),
@@ -130,14 +124,6 @@ def planned_walk(robot: Robot, gait: Gait, steps: int, command: str = "") -> Tra
             "command": command,
         },
     )
-
-
-def _table_file(robot: Robot) -> str:
-    """The file of the robot's own table; none for a bundled robot, or one edited since it was read."""
-    path = Path(robot.path) if robot.text_matches and robot.path else None
-    if path is None or not path.is_file() or path.resolve().is_relative_to(data_folder(ROBOTS).resolve()):
-        return ""
-    return str(path.resolve())
 
 
 def _deviations(done: Followed, T_world_tip: Mapping[str, Array]) -> Iterator[str]:

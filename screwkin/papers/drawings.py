@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from screwkin.analysis.compliance import Trial
+from screwkin.dynamics.on_floor import soles_on_floor
 from screwkin.errors import InputError
-from screwkin.gait.balance import soles_on_floor
 from screwkin.papers.bench import Bench
 from screwkin.papers.measures_leg import FINE, compensated_of, foot_from_waist, map_of, sinking_of, zmp_lines
 from screwkin.papers.measures_springs import trial_of

@@ -8,8 +8,8 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.analysis.placed_soles import support_phases
+from screwkin.dynamics.on_floor import soles_on_floor
 from screwkin.dynamics.terrain import Terrain
-from screwkin.gait.balance import soles_on_floor
 from screwkin.gait.ground import ground_of
 from screwkin.model.robot import Robot
 from screwkin.sim.camera import following

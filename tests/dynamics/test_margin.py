@@ -10,9 +10,9 @@ import screwkin as sk
 from screwkin.compiler import native
 from screwkin.compiler.run import run
 from screwkin.dynamics.margin import margin, support_margin
+from screwkin.dynamics.on_floor import soles_on_floor
 from screwkin.dynamics.support import convex_hull
 from screwkin.errors import InputError
-from screwkin.gait.balance import soles_on_floor
 from tests.dynamics.test_support import SOLE, shapely_margin
 
 PATHS = ["python", "numpy", *(["C"] if native.compiler() else [])]

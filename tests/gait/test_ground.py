@@ -17,10 +17,10 @@ import screwkin as sk
 from screwkin.analysis.consistency import motion_faults
 from screwkin.cli import run
 from screwkin.dynamics.margin import support_margin
+from screwkin.dynamics.on_floor import soles_on_floor
 from screwkin.dynamics.support import sole_corners
 from screwkin.dynamics.terrain import Terrain
 from screwkin.errors import GaitError, NoSolutionError, TrajectoryError
-from screwkin.gait.balance import soles_on_floor
 from screwkin.gait.files import parse_gait
 from screwkin.gait.ground import ground_of
 from screwkin.gait.listed import load_footsteps, with_footsteps

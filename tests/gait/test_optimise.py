@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from screwkin.dynamics.margin import support_margin
+from screwkin.dynamics.on_floor import soles_on_floor
 from screwkin.errors import GaitError, InputError, NoSolutionError, UnknownNameError
-from screwkin.gait.balance import soles_on_floor, zmp
+from screwkin.gait.balance import zmp
 from screwkin.gait.balance_problem import balance_problem, support_edges
 from screwkin.gait.files import load_gait
 from screwkin.gait.optimise import optimise_waist, waist_table

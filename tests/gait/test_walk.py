@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import screwkin as sk
+from screwkin.dynamics.on_floor import ground_margin
 from screwkin.errors import InputError, LimitError, NoSolutionError
-from screwkin.gait.balance import ground_margin
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import screwkin as sk
+from screwkin.dynamics.on_floor import soles_on_floor
 from screwkin.errors import NoSolutionError
-from screwkin.gait.balance import soles_on_floor
 from screwkin.viewer.controls import dragged, gait_sliders, joint_sliders
 from screwkin.viewer.scene import first_pose
 from screwkin.viewer.session import advanced, begun, handled, replanned, with_motion
