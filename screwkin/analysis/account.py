@@ -11,6 +11,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, norm, pose_from_array, rotation_from_array, rotation_log, unstack
 from screwkin.analysis.servo_shares import ServoShare, servo_shares
+from screwkin.analysis.step_collisions import StepCollision, step_collisions
 from screwkin.errors import TableError, TrajectoryError
 from screwkin.files import text_sha256
 from screwkin.gait.balance import Balance, zmp
@@ -87,6 +88,11 @@ class Account:
         return steps if isinstance(steps, int) else None
 
     @cached_property
+    def collisions(self) -> tuple[StepCollision, ...] | None:
+        """Links that enter each other, step by step; None where MuJoCo is not there to look."""
+        return step_collisions(self.robot, self.motion, self.boundaries)
+
+    @cached_property
     def servos(self) -> Mapping[str, ServoShare]:
         """For every joint: how much of its speed and torque the motion asks for."""
         return servo_shares(self.robot, self.motion)
@@ -110,6 +116,7 @@ class Account:
             (beyond, "more torque than the servo has at the planned speed"),
         )
         noted = [f"{text}: {', '.join(joints)}" for joints, text in texts if joints]
+        noted += map(str, self.collisions or ())
         gap = float(np.diff(self.trajectory.time).max())
         if gap > _COARSE:
             noted.append(f"samples are {gap:.3g} s apart; margins and spikes between them are not seen")

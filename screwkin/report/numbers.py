@@ -49,6 +49,7 @@ def walk_data(account: Account) -> dict[str, Any]:
             limb.limb: {"sigma": limb.sigma, "near": limb.near, "cause": limb.cause} for limb in account.limbs
         },
         "servos": {name: asdict(share) for name, share in account.servos.items()},
+        "self_collisions": None if account.collisions is None else [c.to_dict() for c in account.collisions],
         "warnings": list(account.warnings),
         "trajectory_sha256": trajectory.sha256,
     }
@@ -86,6 +87,11 @@ def walk_numbers(account: Account) -> list[Number]:
         limb = min(account.limbs, key=lambda limb: limb.sigma)
         at = f"{limb.limb} at {trajectory.time[limb.sample]:.2f} s; below 0.02 is near singular"
         rows.append(Number("least singular value", f"{limb.sigma:.3f}", at))
+    pairs = None if account.collisions is None else {one.collision.links for one in account.collisions}
+    if pairs is None:
+        rows.append(Number("links that collide", "unknown", "MuJoCo is not installed"))
+    elif pairs:
+        rows.append(Number("links that collide", str(len(pairs)), "pairs; see the warnings"))
     return rows + _servo_numbers(account)
 
 
