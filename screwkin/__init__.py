@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from screwkin.gait.joined import join
     from screwkin.gait.listed import footsteps
     from screwkin.gait.record import Gait
+    from screwkin.gait.stand import stand
     from screwkin.gait.walk import walk
     from screwkin.ik.limb import limb_ik
     from screwkin.ik.pose import solve_pose
@@ -70,6 +71,7 @@ _HOMES = {
     "gait.joined": "join",
     "gait.listed": "footsteps",
     "gait.record": "Gait",
+    "gait.stand": "stand",
     "gait.walk": "walk",
     "ik.limb": "limb_ik",
     "ik.pose": "solve_pose",
@@ -139,6 +141,7 @@ __all__ = [
     "secondary_rates",
     "singularity_report",
     "solve_pose",
+    "stand",
     "static_deflection",
     "static_forces",
     "steps_along",

@@ -22,6 +22,7 @@ from screwkin.gait.fitting import fitting_gait
 from screwkin.gait.goals import load_curve, steps_along, steps_to
 from screwkin.gait.listed import Footsteps, load_footsteps, with_footsteps
 from screwkin.gait.record import Gait
+from screwkin.gait.stand import Place, stand
 from screwkin.gait.walk import walk as walk_of
 from screwkin.gait.write import gait_toml
 from screwkin.model.robot import Robot, robot_text
@@ -44,6 +45,14 @@ def walk(
     goals: Annotated[
         list[str] | None,
         typer.Option("--goal", metavar="X,Y,YAW", help="Go there [m, rad], and on to the next if repeated."),
+    ] = None,
+    places: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--stand",
+            metavar="X,Y,Z,SECONDS",
+            help="No steps: the waist goes there from home [m, s], on to the next if repeated, and home.",
+        ),
     ] = None,
     curve: Annotated[
         Path | None, typer.Option(metavar="FILE", help="A CSV file of points to follow: x, y [m].")
@@ -78,15 +87,17 @@ def walk(
     assignments = [*(assignments or []), *([] if com is None else [f"com={com}"])]
     if auto and gait is not None:
         raise InputError("--auto chooses the gait; leave --gait out")
-    where = _where_to(list_of_steps, goals or [], curve)
+    where = _where_to(list_of_steps, goals or [], curve, places or [])
     name = gait or (stepping_gait(table.name) if where else default_gait(table.name))
     chosen = changed(fitting_gait(table) if auto else load_gait(name), assignments, rate)
-    if where:
+    if where and not places:
         chosen = with_footsteps(chosen, _steps(table, chosen, list_of_steps, goals or [], curve))
-    steps = chosen.steps if steps is None else steps
+    if places and steps is not None:
+        raise InputError("--stand makes no steps; leave --steps out")
+    steps = 0 if places else chosen.steps if steps is None else steps
     command = command_of(robot, None if auto else name, steps, assignments, rate, where)
     with output_folder(output, "walk", table.name) as folder:
-        account, remedied = _planned(table, chosen, steps, command), None
+        account, remedied = _planned(table, chosen, steps, command, _places(places or [])), None
         if wanted is not None:
             command = shlex.join([*shlex.split(command), *wanted.words])
             remedied = compensated(table, account.trajectory, wanted, command, folder)
@@ -117,18 +128,27 @@ def stepping_gait(robot: str) -> str:
     return "auto" if own == default_gait("") else own
 
 
-def _where_to(footsteps: Path | None, goals: Sequence[str], curve: Path | None) -> list[str]:
+def _places(texts: Sequence[str]) -> list[Place]:
+    """Places of ``--stand``."""
+    write = "three lengths in m and a time in s, as 0,0,-0.02,1"
+    rows = (numbers_of(text, "--stand", (4,), "place", write) for text in texts)
+    return [(x, y, z, seconds) for x, y, z, seconds in rows]
+
+
+def _where_to(
+    footsteps: Path | None, goals: Sequence[str], curve: Path | None, places: Sequence[str]
+) -> list[str]:
     """The words of the command line that say where a walk goes; none: as the gait does.
 
     Raises:
         InputError: several ways of saying so.
     """
-    ways = {"--footsteps": footsteps, "--goal": goals, "--curve": curve}
+    ways = {"--footsteps": footsteps, "--goal": goals, "--curve": curve, "--stand": places}
     given = [option for option, value in ways.items() if value]
     if len(given) > 1:
         raise InputError(f"{' and '.join(given)} each say where the walk goes; give one of them")
-    if goals:
-        return [f"--goal={goal}" for goal in goals]
+    if goals or places:
+        return [*(f"--goal={goal}" for goal in goals), *(f"--stand={place}" for place in places)]
     return [word for option in given for word in (option, str(ways[option]))]
 
 
@@ -182,7 +202,7 @@ def command_of(
 ) -> str:
     """The command line that plans the same trajectory again, wherever its files go."""
     words = ["screwkin", "walk", robot, *(["--auto"] if gait is None else ["--gait", gait])]
-    words += ["--steps", str(steps), *where]
+    words += [*(["--steps", str(steps)] if steps else []), *where]
     words += [word for text in assignments for word in ("--set", text)]
     words += [] if rate is None else ["--rate", f"{rate:g}"]
     return shlex.join(words)
@@ -195,9 +215,12 @@ def make_trajectory(robot: Robot, gait: Gait, steps: int, command: str, folder: 
     return account
 
 
-def _planned(robot: Robot, gait: Gait, steps: int, command: str) -> Account:
+def _planned(robot: Robot, gait: Gait, steps: int, command: str, places: Sequence[Place] = ()) -> Account:
     with progress_bar("walk") as done:
-        trajectory = walk_of(robot, gait, steps, command)
+        if places:
+            trajectory = stand(robot, gait, *places, command=command)
+        else:
+            trajectory = walk_of(robot, gait, steps, command)
         done(0.5)
         return account_of(robot, trajectory)
 
@@ -219,7 +242,8 @@ def write_report(account: Account, folder: Path) -> Path:
 
 
 def _print_summary(account: Account, gait: Gait, folder: Path) -> None:
-    say(f"{account.robot.name} walks {account.steps} steps of gait {gait.name}")
+    what = f"walks {account.steps} steps" if account.steps else "stands, with the arms"
+    say(f"{account.robot.name} {what} of gait {gait.name}")
     say(aligned(walk_numbers(account), "  "))
     for warning in account.warnings:
         remark(f"warning: {warning}")

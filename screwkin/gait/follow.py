@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from screwkin.errors import LimitError, SingularError, UnreachableError
@@ -15,7 +16,7 @@ from screwkin.gait.realise import differentiate, posed_hands, positions
 from screwkin.gait.record import Gait
 from screwkin.gait.resting import held_arms
 from screwkin.gait.slope import tilted
-from screwkin.gait.stance import stance_of
+from screwkin.gait.stance import Stance, stance_of
 from screwkin.ik.pose_solution import PoseSolution
 from screwkin.mechanism.choice import closed_mechanism
 from screwkin.mechanism.joint_motion import JointMotion
@@ -51,7 +52,13 @@ class Followed:
         return dict(zip(names, self.motion.sigma.min(axis=0).tolist(), strict=True))
 
 
-def follow(robot: Robot, gait: Gait, steps: int, at_rest: tuple[str, ...] = ()) -> Followed:
+Planner = Callable[[Mechanism, Gait, Stance, int], Plan]
+"""What makes the plan of so many steps of a gait, for what moves."""
+
+
+def follow(
+    robot: Robot, gait: Gait, steps: int, at_rest: tuple[str, ...] = (), planner: Planner | None = None
+) -> Followed:
     """Plan a gait and solve for the joints; an arm that cannot follow its hand rests at home.
 
     Args:
@@ -59,6 +66,7 @@ def follow(robot: Robot, gait: Gait, steps: int, at_rest: tuple[str, ...] = ()) 
         gait: fitted to the robot.
         steps: number of steps, at least 1.
         at_rest: names of arms that rest in any case.
+        planner: of the plan; default: that of the gait's kind.
 
     Raises:
         UnreachableError, SingularError, LimitError: a leg cannot follow; names limb, sample and time.
@@ -77,7 +85,9 @@ def follow(robot: Robot, gait: Gait, steps: int, at_rest: tuple[str, ...] = ()) 
             notes += tuple(_rests(robot, gait, arm, why) for arm, why in unable.items())
             continue
         try:
-            if gait.kind == "geometric":
+            if planner is not None:
+                planned = planner(mechanism, gait, stance, steps)
+            elif gait.kind == "geometric":
                 planned = plan(gait, stance, steps)
             else:
                 planned = preview_plan(mechanism, gait, stance, steps)

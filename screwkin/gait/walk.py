@@ -85,8 +85,18 @@ def planned_walk(robot: Robot, gait: Gait, steps: int, command: str = "") -> Tra
         UnreachableError, SingularError, LimitError: names limb, sample and time.
         GaitError, InputError: the gait does not fit the robot.
     """
-    record = robot_record(robot)
-    done = follow(robot, gait, steps)
+    return followed_trajectory(robot, follow(robot, gait, steps), steps, command)
+
+
+def followed_trajectory(robot: Robot, done: Followed, steps: int, command: str = "") -> Trajectory:
+    """The trajectory of a plan that the joints follow, with its balance.
+
+    Args:
+        robot: of the plan.
+        done: the plan and the joints' motion.
+        steps: number of steps, to record.
+        command: the command line to record in the file.
+    """
     drive, planned = done.drive, done.planned
     q = drive.positions(done.solution.state.q)
     qd, qdd = drive.rates(done.motion.qd), drive.rates(done.motion.qdd)
@@ -111,8 +121,8 @@ def planned_walk(robot: Robot, gait: Gait, steps: int, command: str = "") -> Tra
         zmp=zmp,
         margin=ground_margin(zmp, com, wrench, soles, planned.contact),
         meta={
-            "robot": record,
-            "gait": gait.to_dict(),
+            "robot": robot_record(robot),
+            "gait": planned.gait.to_dict(),
             "steps": steps,
             "boundaries": planned.boundaries.tolist(),
             "closure": float(done.solution.residual.max()),
