@@ -20,7 +20,7 @@ TOLERANCE, MOST = 1e-7, 50
 NOTE = f"frame and position tasks, iterated until joints change by less than {TOLERANCE:g}, at most {MOST}"
 
 
-def _urdf(robot: Robot) -> str:
+def urdf_with_tips(robot: Robot) -> str:
     """The robot with a link of its own at every tip."""
     frames, tips = urdf_frames(robot), []
     for limb in robot.limbs:
@@ -38,7 +38,7 @@ class Body:
         import placo
 
         with TemporaryDirectory() as directory:
-            Path(directory, "robot.urdf").write_text(_urdf(robot))
+            Path(directory, "robot.urdf").write_text(urdf_with_tips(robot))
             self.robot = placo.RobotWrapper(directory, placo.Flags.ignore_collisions)
         self.solver = placo.KinematicsSolver(self.robot)
         self.solver.mask_fbase(True)

@@ -83,6 +83,21 @@ def wilson(falls: int, rows: int) -> Interval | None:
     return float(interval.low), float(interval.high)
 
 
+def mcnemar(only_first: int, only_second: int) -> float:
+    """Probability of pairs that differ at least as much one way, if both ways are equally likely.
+
+    Args:
+        only_first: pairs in which it happened to the first alone.
+        only_second: to the second alone.
+
+    Source: McNemar (1947); exact, by the binomial distribution of the discordant pairs.
+    """
+    from scipy.stats import binomtest
+
+    discordant = only_first + only_second
+    return float(binomtest(only_first, discordant).pvalue) if discordant else 1.0
+
+
 def tally(outcomes: Sequence[Outcome]) -> Tally:
     """Counts of outcomes, of any rows."""
     count = dict.fromkeys(STATUSES, 0)
@@ -119,16 +134,12 @@ def paired(campaign: Campaign, outcomes: Mapping[int, Outcome], first: int, seco
         first: number of a setting.
         second: of another.
 
-    Source: McNemar (1947); exact, by the binomial distribution of the discordant pairs.
     """
-    from scipy.stats import binomtest
-
     one, other = (_of(campaign, outcomes, k) for k in (first, second))
     both = [(one[run].status, other[run].status) for run in one if run in other]
     pairs = [pair for pair in both if {*pair} <= {"stood", "fell"}]
     only_first, only_second = pairs.count(("fell", "stood")), pairs.count(("stood", "fell"))
-    discordant = only_first + only_second
-    p = float(binomtest(only_first, discordant).pvalue) if discordant else 1.0
+    p = mcnemar(only_first, only_second)
     return Paired(first, second, len(pairs), only_first, only_second, p)
 
 

@@ -18,7 +18,9 @@ from screwkin.model.state import State
 
 BACK = np.array([0.012, 0.012, 0.06])
 """By how much a step differs from the planned one, forward, left [m] and in its turn [rad], at most."""
-_STRAY = np.array([0.03, 0.03, 0.2])  # what a foot may lie beside its command; beyond it nothing is believed
+SHARE = 0.5
+"""Of the way back that a step goes: feet that twist to and fro in turn are not driven on by it."""
+_STRAY = np.array([0.03, 0.03, 0.2])  # by how much a foot lies beside its command at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,8 +50,7 @@ class Whereabouts:
         """
         if not _read(attitude, q):
             return self
-        turn = _heading(attitude @ _foot(robot, q, tip)[:3, :3]) - float(self.stance[2])
-        return replace(self, north=turn)
+        return replace(self, north=float(_on_floor(attitude, _foot(robot, q, tip))[2] - self.stance[2]))
 
     def measured(self, robot: Robot, attitude: Array, q: Array, tips: tuple[str, str]) -> Whereabouts:
         """Both feet stand: where the newly landed one is, by what was measured.
@@ -62,14 +63,13 @@ class Whereabouts:
         """
         if self.north is None or not _read(attitude, q):
             return self
-        new, old = (_foot(robot, q, tip) for tip in tips)
-        c, s = np.cos(self.north), np.sin(self.north)
-        x, y, _ = attitude @ (new[:3, 3] - old[:3, 3])
-        yaw = _heading(attitude @ new[:3, :3]) - self.north
-        seen = np.array([self.other[0] + c * x + s * y, self.other[1] + c * y - s * x, yaw])
-        off = seen - self.stance
-        off[2] = _arc(off[2])
-        return replace(self, stance=self.stance + off) if (np.abs(off) < _STRAY).all() else self
+        new, old = (_on_floor(attitude, _foot(robot, q, tip)) for tip in tips)
+        stood = np.array([*self.other[:2], old[2] - self.north])
+        step = seen_from(new, old)
+        commanded = seen_from(self.stance, self.other)
+        off = step - commanded
+        off[2] = _arc(float(off[2]))
+        return replace(self, stance=joined_place(stood, commanded + np.clip(off, -_STRAY, _STRAY)))
 
 
 def back_to_plan(place: Array, footholds: Array, steps: Array) -> Array:
@@ -84,7 +84,7 @@ def back_to_plan(place: Array, footholds: Array, steps: Array) -> Array:
     for goal, step in zip(footholds, steps, strict=True):
         off = seen_from(goal, place) - step
         off[2] = _arc(off[2])
-        rows.append(step + np.clip(off, -BACK, BACK))
+        rows.append(step + np.clip(SHARE * off, -BACK, BACK))
         place = joined_place(place, rows[-1])
     return np.array(rows).reshape(-1, 3)
 
@@ -108,6 +108,11 @@ def _read(attitude: Array, q: Array) -> bool:
 
 def _foot(robot: Robot, q: Array, tip: str) -> Array:
     return np.asarray(frame_pose(robot, State(np.eye(4), q), tip))
+
+
+def _on_floor(attitude: Array, T: Array) -> Array:
+    """x, y, yaw (3,) of a frame of the base, seen from above in the IMU's heading."""
+    return np.array([*(attitude @ T[:3, 3])[:2], _heading(attitude @ T[:3, :3])])
 
 
 def _heading(R: Array) -> float:

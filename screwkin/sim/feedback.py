@@ -13,6 +13,7 @@ from screwkin.algebra.se3 import Z, as_array, rotate, rotation_exp, vector_from_
 from screwkin.dynamics.terrain import Terrain
 from screwkin.gait.rhythm import CYCLE
 from screwkin.gait.stabilised import Felt, StabilisedWalk
+from screwkin.kinematics.limits import limited_joints, limits_of
 from screwkin.model.robot import Robot
 from screwkin.sim.backend import Observation
 from screwkin.sim.perturbation import Perturbation
@@ -28,8 +29,10 @@ class Controller(Protocol):
     period: float
     """Of a cycle [s]."""
 
-    settings: Mapping[str, Any]
-    """Of the controller, as JSON data."""
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """Of the controller, as JSON data, and how it went."""
+        ...
 
     def reset(self) -> Array:
         """Begin anew; joint positions (n,) at first."""
@@ -44,6 +47,8 @@ class WalkController:
     """A stabilised walk as a controller; without feedback it walks the same, open loop.
 
     What commands of the plan allow for its servos is allowed for here too, at the phase in which the walk is.
+    No command is beyond a joint's limits, nor faster than its servo from the one before. deviation (n,): how
+    far joint positions have come from the plan's at that phase, at most.
     """
 
     period = CYCLE
@@ -52,21 +57,33 @@ class WalkController:
         self, walk: StabilisedWalk, feedback: bool = True, commands: Trajectory | None = None
     ) -> None:
         self._allowed = np.zeros_like(walk.q) if commands is None else walk.allowance(commands)
-        self.walk, self.feedback, self.course = walk, feedback, walk.start
-        self.settings: Mapping[str, Any] = asdict(walk.gains) | ({} if feedback else {"open_loop": True})
+        self.walk, self.feedback = walk, feedback
+        self._low, self._high = limits_of(walk.body.robot)
+        rate = [joint.velocity for joint in limited_joints(walk.body.robot)]
+        self._farthest = np.array(rate) * self.period
+        self.reset()
+
+    @property
+    def settings(self) -> Mapping[str, Any]:
+        """Gains, and how far the walk has come from its plan [rad]."""
+        way = {"deviation": float(self.deviation.max())} if self.feedback else {"open_loop": True}
+        return asdict(self.walk.gains) | way
 
     def reset(self) -> Array:
         """From the start of the walk."""
         self.course = self.walk.start
-        return self._command()
+        self.deviation = np.zeros_like(self.course.q)
+        self._last = np.clip(self.course.q + self._allowed[0], self._low, self._high)
+        return self._last
 
     def answer(self, felt: Felt) -> Array:
         """The next cycle's command."""
         self.course = self.walk.advanced(self.course, felt, self.feedback)
-        return self._command()
-
-    def _command(self) -> Array:
-        return self.course.q + self._allowed[self.walk.phase(self.course)]
+        now = self.walk.phase(self.course)
+        self.deviation = np.maximum(self.deviation, np.abs(self.course.q - self.walk.q[now]))
+        goal = np.clip(self.course.q + self._allowed[now], self._low, self._high)
+        self._last = self._last + np.clip(goal - self._last, -self._farthest, self._farthest)
+        return self._last
 
 
 class Senses:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import screwkin as sk
 from screwkin.algebra.se3 import Z, as_array, rotate
-from screwkin.gait.odometry import BACK, Whereabouts, back_to_plan, joined_place, seen_from
+from screwkin.gait.odometry import BACK, SHARE, Whereabouts, back_to_plan, joined_place, seen_from
 from screwkin.gait.stabilised import Felt, StabilisedWalk, stabilised
 from screwkin.model.robot import Robot
 
@@ -40,21 +40,22 @@ def test_a_place_seen_from_another_is_the_step_to_it(origin: np.ndarray, step: n
 def test_steps_come_back_to_the_planned_footholds(
     start: np.ndarray, plan: list[np.ndarray], off: np.ndarray
 ) -> None:
-    """From the plan they are the plan's; from beside it, each within its bound, and there in the end."""
+    """From the plan they are the plan's; from beside it, each within its bound, nearer by half."""
     footholds = [start]
     for step in plan:
         footholds.append(joined_place(footholds[-1], step))
     goals = np.array(footholds[1:])
     np.testing.assert_allclose(back_to_plan(start, goals, np.array(plan)), plan, atol=1e-12)
-    strayed = start + 0.3 * off
+    strayed = joined_place(start, 0.1 * off)
     back = back_to_plan(strayed, goals, np.array(plan))
     assert (np.abs(back - plan) <= BACK + 1e-12).all()
-    place, far = strayed, [np.abs(0.3 * off[2])]
+    place, turns = strayed, [0.1 * off[2]]
     for step, goal in zip(back, goals, strict=True):
         place = joined_place(place, step)
-        far.append(np.abs(place[2] - goal[2]))
-    assert (np.diff(far) <= 1e-9).all()
-    np.testing.assert_allclose(place, goals[-1], atol=1e-9)
+        turns.append(place[2] - goal[2])
+    np.testing.assert_allclose(turns, 0.1 * off[2] * SHARE ** np.arange(9), atol=1e-12)
+    far = np.linalg.norm(place[:2] - goals[-1][:2])
+    assert far <= 0.2 * np.linalg.norm(0.1 * off[:2]) + 0.1 * np.abs(off[2]) * np.abs(plan[-1][:2]).sum()
 
 
 def test_no_steps_are_none() -> None:
@@ -91,9 +92,19 @@ def test_a_landed_foot_is_where_kinematics_has_it(
     np.testing.assert_allclose(seen.stance, truth, atol=1e-9)
 
 
-def test_what_cannot_be_is_not_believed(robot: Robot) -> None:
+def test_a_foot_is_believed_to_lie_a_hand_s_breadth_beside_its_command_at_most(robot: Robot) -> None:
+    """However far the joints say it is; and a robot that was turned half round knows it."""
+    q = np.array(sk.home(robot).q)
+    feet = Whereabouts(np.array([1.0, 0.0, 0.0]), np.zeros(3), 0.0)
+    seen = feet.measured(robot, np.eye(3), q, FEET)
+    np.testing.assert_allclose(seen.stance, [0.97, 0.03, 0.0], atol=1e-9)
+    turned = feet.measured(robot, as_array(rotate(Z, np.pi - 0.1)), q, FEET)
+    assert turned.stance[2] == pytest.approx(np.pi - 0.1)
+
+
+def test_what_is_no_number_is_not_believed(robot: Robot) -> None:
     q, feet = np.array(sk.home(robot).q), Whereabouts(np.array([1.0, 0.0, 0.0]), np.zeros(3), 0.0)
-    for attitude, joints in ((np.eye(3), q), (np.full((3, 3), np.nan), q), (np.eye(3), np.nan * q)):
+    for attitude, joints in ((np.full((3, 3), np.nan), q), (np.eye(3), np.nan * q)):
         assert (feet.measured(robot, attitude, joints, FEET).stance == feet.stance).all()
     blind = replace(feet, north=None)
     assert blind.measured(robot, np.eye(3), q, FEET) is blind
@@ -116,4 +127,4 @@ def test_a_robot_that_twists_on_its_feet_walks_on_in_the_plan_s_direction(walk: 
         course = walk.advanced(course, Felt(attitude, course.q, np.ones(2), np.zeros((2, 2))))
     assert course.landed == len(walk.steps)
     heading = course.memory[6] + turn  # of the last foot: what is commanded, and how far the floor turned it
-    assert abs(heading) < 0.035 < 0.5 * turn
+    assert abs(heading) < 0.065 < turn

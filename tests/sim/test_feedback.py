@@ -12,9 +12,11 @@ from hypothesis import strategies as st
 import screwkin as sk
 from screwkin.algebra.se3 import X, Z, as_array, rotate
 from screwkin.errors import InputError
+from screwkin.gait.stabilised import Felt, stabilised
+from screwkin.kinematics.limits import limited_joints, limits_of
 from screwkin.model.robot import Robot
 from screwkin.sim.backend import Contact, Observation
-from screwkin.sim.feedback import Senses
+from screwkin.sim.feedback import Senses, WalkController
 from screwkin.sim.perturbation import NONE, Perturbation
 from screwkin.sim.perturbation_files import perturbation_from_texts
 
@@ -86,3 +88,24 @@ def test_noise_has_its_deviation_a_bias_stays_and_a_late_sense_is_of_before(robo
     late = Senses(robot, Perturbation(sense_lag=0.02), FEET)
     felt = [late.feel(replace(seen, q=seen.q + k), PERIOD).q[0] - seen.q[0] for k in range(6)]
     assert felt == [0.0, 0.0, 0.0, 1.0, 2.0, 3.0]
+
+
+def test_whatever_is_felt_commands_keep_to_limits_and_speeds(robot: Robot) -> None:
+    """Thrown about: no joint beyond its limits, none faster than its servo; it says how far it came."""
+    gait = sk.load_gait("preview").replace(Tc=0.4, stride=0.08, lift=0.012, lead=0.6, horizon=1.0)
+    walk = stabilised(robot, sk.walk(robot, gait, steps=2))
+    controller, rng = WalkController(walk), np.random.default_rng(3)
+    (low, high), speeds = limits_of(robot), np.array([joint.velocity for joint in limited_joints(robot)])
+    sent = [controller.reset()]
+    assert controller.settings["deviation"] == 0.0
+    for k in range(400):
+        turn = as_array(rotate(X, 0.6 * np.sin(0.3 * k)) @ rotate(Z, rng.normal()))
+        felt = Felt(turn, rng.normal(size=18), rng.uniform(0, 20, 2), rng.normal(size=(2, 2)))
+        sent.append(controller.answer(felt))
+    q = np.array(sent)
+    assert (q >= low).all()
+    assert (q <= high).all()
+    rates = np.abs(np.diff(q, axis=0)) / controller.period
+    assert (rates <= speeds * (1 + 1e-9)).all()
+    assert rates.max() == pytest.approx(speeds.max())  # it was at its limit
+    assert controller.settings["deviation"] > 0.1
