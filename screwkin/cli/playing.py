@@ -16,7 +16,7 @@ from screwkin.errors import OutputError
 from screwkin.servo.bus import Bus, open_line
 from screwkin.servo.guarded import Guard, GuardedLine, Guardian, NoGuard, Place, no_guardian
 from screwkin.servo.log import JOURNAL, Log, check_room, close_journal
-from screwkin.servo.player import Player, PlayOutcome, PlaySettings
+from screwkin.servo.player import Governor, Player, PlayOutcome, PlaySettings
 
 SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")
 """By which a user, a shell or a terminal asks a program to end; not every system has all of them."""
@@ -24,7 +24,9 @@ SIGNALS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT")
 _BESIDE = 10.0  # s that soft start and rest last at most
 
 
-def played_on_port(may: Ready, settings: PlaySettings, log: Path, place: Place) -> PlayOutcome:
+def played_on_port(
+    may: Ready, settings: PlaySettings, log: Path, place: Place, governor: Governor | None = None
+) -> PlayOutcome:
     """Play on a serial port, with a guardian where the system has one; see ``played``.
 
     Raises:
@@ -37,7 +39,7 @@ def played_on_port(may: Ready, settings: PlaySettings, log: Path, place: Place) 
     if not why:
         guard = Guardian(place, log.with_suffix(JOURNAL))
     bus = Bus(GuardedLine(line, guard), place.protocol, place.baud, port=place.port)
-    return played(bus, may, settings, log, {"port": place.port}, guard)
+    return played(bus, may, settings, log, {"port": place.port}, guard, governor=governor)
 
 
 def played(
@@ -48,6 +50,7 @@ def played(
     facts: Mapping[str, Any],
     guard: Guard | None = None,
     follow: Callable[[float], None] = lambda share: None,
+    governor: Governor | None = None,
 ) -> PlayOutcome:
     """Play on a bus, close it, and leave a log whatever happens once the servos move.
 
@@ -59,6 +62,7 @@ def played(
         facts: what its ``meta`` holds besides.
         guard: of the servos; by default nobody.
         follow: called at every frame of the trajectory with the share of it that was played.
+        governor: gives the goals in place of the trajectory, by what is measured.
 
     Raises:
         OutputError: no log can be written; nothing has moved.
@@ -83,7 +87,7 @@ def played(
 
                 opened = True
                 record = Log(may.bounds.names, may.bounds.ids, file, meta)
-                player = Player(bus, may.robot, settings, stopped, progress, record, guard)
+                player = Player(bus, may.robot, settings, stopped, progress, record, guard, governor)
                 try:
                     outcome = player.play(may.commands)
                 finally:

@@ -11,6 +11,7 @@ import typer
 from screwkin.analysis.engines import simulated_on
 from screwkin.analysis.readiness import Ready, ready
 from screwkin.cli.folder import output_folder
+from screwkin.cli.governed import feedback_wanted, governed_by_imu, governed_virtually, imu_port
 from screwkin.cli.injected import Faults, FormerFaults, Seed, injected_faults
 from screwkin.cli.options import AsJson, OutputFolder, TrajectoryPath
 from screwkin.cli.output import print_json, remark, say
@@ -54,6 +55,14 @@ def send(
     ] = Thresholds.notice,
     on_fault: Annotated[str, typer.Option(help="After a fault: hold or limp.")] = "hold",
     at_end: Annotated[str, typer.Option(help="After the last frame: hold or limp.")] = "hold",
+    feedback: Annotated[
+        str,
+        typer.Option(
+            metavar="imu:PORT",
+            help="Walk with the stabiliser, by the IMU on that port, as far from the plan as "
+            "validate --feedback --runs allows; with --virtual: imu:virtual.",
+        ),
+    ] = "",
     rs485: Annotated[bool, typer.Option("--rs485", help="Let the kernel switch direction.")] = False,
     inject_fault: Faults = None,
     trouble: FormerFaults = None,
@@ -82,6 +91,7 @@ def send(
         at_end=_state(at_end),
         thresholds=Thresholds(notice=_notice(notice)),
     )
+    imu = imu_port(feedback, bool(port)) if feedback else ""
     may = ready(trajectory, robot or None, settings)
     servos, bounds, frames = may.servos, may.bounds, may.frames
     carried = budget(bounds.profiles, servos.baud)
@@ -96,6 +106,9 @@ def send(
         "reads_per_frame": carried.reads(rate),
         "deviation_mm": 1e3 * may.deviation,
     }
+    wanted = feedback_wanted(trajectory, may, rate, imu) if imu else None
+    if wanted is not None:
+        facts |= {"feedback": imu, "feedback_bound_rad": max(wanted.bound.deviation.values())}
     if not go:
         _print_dry(trajectory, frames, bounds, facts, as_json)
         return 0
@@ -103,10 +116,12 @@ def send(
         log = folder / "play.npz"
         if port:
             place = Place(port, servos.baud, rs485, servos.protocol)
-            outcome = played_on_port(may, settings, log, place)
+            with governed_by_imu(wanted) as governor:
+                outcome = played_on_port(may, settings, log, place, governor)
         else:
             bus, guard, follow = virtual_bus(may, faults, seed)
-            outcome = played(bus, may, settings, log, {"port": "virtual"}, guard, follow)
+            governor = governed_virtually(wanted, bus) if wanted else None
+            outcome = played(bus, may, settings, log, {"port": "virtual"}, guard, follow, governor)
         facts["log"] = str(log_of(log))
     return _print_outcome(outcome, facts, bounds, as_json)
 

@@ -12,7 +12,9 @@ import typer
 from screwkin.analysis.account import account_of, recorded_robot
 from screwkin.analysis.clear_hands import clearing_hand_drop
 from screwkin.analysis.engines import AUTO, SimulatedCompliance, servo_for
+from screwkin.analysis.feedback_bound import WORLDS
 from screwkin.analysis.verdict import verdict_of
+from screwkin.cli.feedback_runs import feedback_runs
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, Perturbed, TrajectoryPath, perturbation_of
 from screwkin.cli.output import aligned, print_json, remark, say
@@ -72,6 +74,14 @@ def validate(
         bool,
         typer.Option("--feedback", help="Walk its steps with the stabiliser, by what the robot feels."),
     ] = False,
+    runs: Annotated[
+        int,
+        typer.Option(help="With --feedback: in so many drawn worlds, for send --feedback: feedback.json."),
+    ] = 0,
+    worlds: Annotated[
+        str, typer.Option(help="With --runs: from what they are drawn, as sweep --perturb takes it.")
+    ] = WORLDS,
+    seed: Annotated[int, typer.Option(help="With --runs: from which the worlds' seeds follow.")] = 0,
     plots: Annotated[bool, typer.Option(help="Draw the pictures and write the report.")] = True,
     log: Annotated[
         Path | None,
@@ -94,6 +104,10 @@ def validate(
                 "--perturb and --feedback"
             )
         return replay(trajectory, log, Wish(engine, check_solver, gui, video, plots), output, as_json)
+    if runs:
+        if not feedback or perturb or compliance != SimulatedCompliance():
+            raise InputError("--runs walks with --feedback in worlds of --worlds, on --servo and --engine")
+        return feedback_runs(trajectory, engine, servo, worlds, runs, seed, as_json)
     by = perturbation_of(perturb or [])
     loaded = load_trajectory(trajectory)
     account = account_of(recorded_robot(loaded, str(trajectory)), loaded)

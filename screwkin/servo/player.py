@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -30,6 +30,7 @@ from screwkin.servo.reading import Readings
 from screwkin.servo.watch import FaultKind, PlayStopped, ServoFault, Thresholds, Watch
 from screwkin.trajectory import Trajectory
 
+_NEWEST = 0.4  # share of the newest reading in how far a joint is behind its goal; a tick is no jump
 _SLACK = 0.1  # s, beyond what a late frame may be late, after which a player hangs
 
 
@@ -88,6 +89,32 @@ class PlayOutcome:
         }
 
 
+class Governor(Protocol):
+    """What gives the goals of every frame in place of a trajectory's, by what is measured."""
+
+    @property
+    def share(self) -> float:
+        """Of the trajectory's time that is over."""
+        ...
+
+    @property
+    def done(self) -> bool:
+        """Whether it is at rest at its end."""
+        ...
+
+    def goals(self, measured: Array, time: float) -> Array:
+        """Goals (n,) [rad] by joint positions now, at a time of the play [s].
+
+        Args:
+            measured: the last goals, less how far joints lagged behind theirs when they were read (n,) [rad].
+            time: of the play [s].
+
+        Raises:
+            PlayStopped: the play may not go on.
+        """
+        ...
+
+
 class Player:
     """Plays on a bus that is open.
 
@@ -100,6 +127,7 @@ class Player:
             from 0 to 1.
         log: of the robot's joints; by default in memory.
         guard: who takes over where the player cannot go on; nobody for servos that end with this process.
+        governor: gives the goals of every frame of the trajectory; by default they are the trajectory's.
     """
 
     def __init__(
@@ -111,6 +139,7 @@ class Player:
         progress: Callable[[float], None] = lambda share: None,
         log: Log | None = None,
         guard: Guard | None = None,
+        governor: Governor | None = None,
     ) -> None:
         self.bus, self.robot, self.settings = bus, robot, settings or PlaySettings()
         self.bounds = Bounds.of(robot, torque=self.settings.torque)
@@ -119,7 +148,8 @@ class Player:
         self.watch = Watch(self.bounds, self.settings.thresholds)
         self.log = log or Log(self.bounds.names, self.bounds.ids)
         self.guard: Guard = guard or NoGuard()
-        self._stop, self._progress = stop, progress
+        self._stop, self._progress, self._governor = stop, progress, governor
+        self._goal = self._behind = np.full(len(self.bounds.ids), np.nan)
         self._frames = self._late = 0
         self._began = bus.clock.now()
         self._due = 0.0
@@ -224,35 +254,60 @@ class Player:
             self.watch.torque_limits = self.bounds.torque
         self._began = self.bus.clock.now()
         self._due = self._began
+        self._behind = pose - start
         self._stream(approach(start, frames.q[0], self.settings.start_speed, frames.rate), None)
-        self._stream(frames.q, frames.time)
-        rest = np.repeat(frames.q[-1:], math.ceil(self.settings.settle * frames.rate), axis=0)
-        self._stream(rest, None)
+        if self._governor is None:
+            self._stream(frames.q, frames.time)
+            last = frames.q[-1]
+        else:
+            last = self._governed(self._governor, float(frames.time[-1]))
+        self._stream(np.repeat(last[None], math.ceil(self.settings.settle * frames.rate), axis=0), None)
+
+    def _governed(self, governor: Governor, lasts: float) -> Array:
+        """Send a governor's goals until it is done; the last ones (n,) [rad]."""
+        while True:
+            self._wait()
+            goal = governor.goals(self._goal + self._behind, self._time())
+            self._send(goal, governor.share * lasts, lasts, goal[None], 1)
+            if governor.done:
+                return goal
 
     def _stream(self, q: Array, times: Array | None) -> None:
-        """Send goals frame by frame at absolute times; in between, read servos as long as there is time."""
-        period, clock = 1.0 / self.settings.rate, self.bus.clock
+        """Send goals (F, n) [rad] frame by frame, of a trajectory at times (F,) [s] or of none."""
         for i, goal in enumerate(q):
-            if (wait := self._due - clock.now()) > 0:
-                clock.sleep(wait)
-            if times is not None:
-                self._progress(float(times[i] / times[-1]))
-            if not self._resting and (kind := self._reason_to_stop()) is not None:
-                self._come_to_rest(q, i, *kind)
-            late = clock.now() - self._due
-            self.gate.goals(goal, period)
-            self._frames += 1
-            self._late += late > self.settings.tolerance
-            self.log.frame(
-                self._due - self._began,
-                late + self._due - self._began,
-                times[i] if times is not None else math.nan,
-                goal,
-            )
-            self.watch.frame(goal, late, self._time())
-            self._due += period
-            self._read(goal)
-            self.log.flush(self._time())
+            self._wait()
+            time, lasts = (math.nan, math.nan) if times is None else (float(times[i]), float(times[-1]))
+            self._send(goal, time, lasts, q, i)
+
+    def _wait(self) -> None:
+        """Until the next frame is due."""
+        if (wait := self._due - self.bus.clock.now()) > 0:
+            self.bus.clock.sleep(wait)
+
+    def _send(self, goal: Array, time: float, lasts: float, q: Array, i: int) -> None:
+        """Send a frame, which is due, then read servos as long as there is time.
+
+        Args:
+            goal: of the frame (n,) [rad].
+            time: of the trajectory that lasts so long [s], NaN beside it.
+            lasts: see there.
+            q: goals (F, n) on which it would come to rest.
+            i: of which this frame is the next.
+        """
+        period, clock = 1.0 / self.settings.rate, self.bus.clock
+        if not math.isnan(time):
+            self._progress(time / lasts)
+        if not self._resting and (kind := self._reason_to_stop()) is not None:
+            self._come_to_rest(q, i, *kind)
+        late = clock.now() - self._due
+        self.gate.goals(goal, period)
+        self._goal, self._frames = goal, self._frames + 1
+        self._late += late > self.settings.tolerance
+        self.log.frame(self._due - self._began, late + self._due - self._began, time, goal)
+        self.watch.frame(goal, late, self._time())
+        self._due += period
+        self._read(goal)
+        self.log.flush(self._time())
 
     def _reason_to_stop(self) -> tuple[FaultKind, str] | None:
         """Why the play should end in order, if it should."""
@@ -279,6 +334,7 @@ class Player:
     def _read(self, goal: Array) -> None:
         def taken(k: int, reply: Reply) -> None:
             values, time = self.readings.values(k, reply), self._time()
+            self._behind[k] += _NEWEST * (values["position"] - float(goal[k]) - self._behind[k])
             self.log.measured(k, values, time)
             self.watch.seen(k, values, reply.errors, time)
             self.watch.tracked(k, values, float(goal[k]), time)

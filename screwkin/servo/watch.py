@@ -29,6 +29,7 @@ FaultKind = Literal[
     "log",
     "guardian",
     "interrupted",
+    "feedback",
 ]
 _HEALTH: frozenset[ErrorBit] = frozenset(("voltage", "overheat", "overload", "hardware"))
 

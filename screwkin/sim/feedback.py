@@ -65,9 +65,10 @@ class WalkController:
 
     @property
     def settings(self) -> Mapping[str, Any]:
-        """Gains, and how far the walk has come from its plan [rad]."""
-        way = {"deviation": float(self.deviation.max())} if self.feedback else {"open_loop": True}
-        return asdict(self.walk.gains) | way
+        """Gains, and how far every joint has come from its plan [rad]."""
+        names = self.walk.body.robot.joint_names
+        far = dict(zip(names, self.deviation.tolist(), strict=True))
+        return asdict(self.walk.gains) | ({"deviation": far} if self.feedback else {"open_loop": True})
 
     def reset(self) -> Array:
         """From the start of the walk."""

@@ -97,7 +97,7 @@ def test_whatever_is_felt_commands_keep_to_limits_and_speeds(robot: Robot) -> No
     controller, rng = WalkController(walk), np.random.default_rng(3)
     (low, high), speeds = limits_of(robot), np.array([joint.velocity for joint in limited_joints(robot)])
     sent = [controller.reset()]
-    assert controller.settings["deviation"] == 0.0
+    assert not any(controller.settings["deviation"].values())
     for k in range(400):
         turn = as_array(rotate(X, 0.6 * np.sin(0.3 * k)) @ rotate(Z, rng.normal()))
         felt = Felt(turn, rng.normal(size=18), rng.uniform(0, 20, 2), rng.normal(size=(2, 2)))
@@ -108,4 +108,4 @@ def test_whatever_is_felt_commands_keep_to_limits_and_speeds(robot: Robot) -> No
     rates = np.abs(np.diff(q, axis=0)) / controller.period
     assert (rates <= speeds * (1 + 1e-9)).all()
     assert rates.max() == pytest.approx(speeds.max())  # it was at its limit
-    assert controller.settings["deviation"] > 0.1
+    assert max(controller.settings["deviation"].values()) > 0.1
