@@ -54,9 +54,8 @@ def joint_sliders(robot: Robot, q: Array) -> list[Slider]:
             for limit, side in ((joint.lower, -1), (joint.upper, 1))
         )
         lower, upper = min(lower, value), max(upper, value, lower + 1e-6)
-        sliders.append(
-            Slider(joint.name, "rad" if turns else "m", lower, upper, (upper - lower) / 1000, value)
-        )
+        step = _round_step(upper - lower, 1000)
+        sliders.append(Slider(joint.name, "rad" if turns else "m", lower, upper, step, value))
     return sliders
 
 
@@ -92,5 +91,11 @@ def gait_sliders(robot: Robot, gait: Gait) -> list[Slider]:
         value = float(values[key])
         low, high = (0.9, 1.03) if key == "waist_height" else (0.5, 1.5)
         lower, upper = sorted((low * value, high * value)) if value else (-0.5, 0.5)
-        sliders.append(Slider(key, _UNITS[key], lower, upper, (upper - lower) / 200, value))
+        step = _round_step(upper - lower, 200)
+        sliders.append(Slider(key, _UNITS[key], lower, upper, step, value))
     return sliders
+
+
+def _round_step(span: float, parts: int) -> float:
+    """The power of ten that divides a range into so many parts or somewhat more: few digits are shown."""
+    return float(10.0 ** np.floor(np.log10(span / parts)))

@@ -41,7 +41,7 @@ class Played:
         self._balls = Moved(balls)
         self._label = scene.add_label("/world/motion/ZMP/label", "ZMP")
         ways = [self._way(name, path) for name, path in self._paths.items()]
-        self._traces = [*balls, self._label, *ways]
+        self._traces = [self._label, *balls, *ways]  # it goes before the ball that carries it
         self._polygon = Redrawn(scene, "/world/motion/polygon", POLYGON)
         self._soles = [Redrawn(scene, f"/world/motion/sole {k}", SOLE) for k in range(len(track.soles))]
         self._drawn: dict[str, bytes] = {}

@@ -4,6 +4,7 @@ import base64
 import json
 import re
 import zlib
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -119,6 +120,17 @@ def test_the_library_is_inside_with_its_licence_named(parts):
     text = inflated(parts[2]).decode()
     assert text.startswith("/* three.js")
     assert "MIT" in text[:200]
+
+
+def test_the_library_holds_what_the_script_uses_and_its_recipe_names_that_alone(parts):
+    root = Path(__file__).resolve().parents[2]
+    script = (root / "screwkin" / "report" / "player.js").read_text(encoding="utf-8")
+    used = set(re.findall(r"\bTHREE\.(\w+)", script))
+    recipe = (root / "docs" / "viewing.md").read_text(encoding="utf-8").split("`entry.js` exports")[1]
+    named = {name for part in re.findall(r"`([^`]+)`", recipe.split(";")[0]) for name in part.split()}
+    assert named - {"three", "three/addons/controls/OrbitControls.js"} == used
+    exported = re.search(r"\{((?:\w+:\(\)=>[\w$]+,?){5,})\}", inflated(parts[2]).decode())[1]
+    assert set(re.findall(r"(\w+):", exported)) == used
 
 
 def test_a_robot_of_a_sly_name_stays_text(account, parts):

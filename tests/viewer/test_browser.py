@@ -14,6 +14,7 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -21,14 +22,6 @@ import pytest
 CHECKOUT = Path(__file__).resolve().parents[2]
 PATIENCE = 120_000
 """How long one waits for anything [ms]: pictures are drawn by the processor here."""
-URDF = """<robot name="pole">
-<link name="foot"><visual><geometry><mesh filename="rod.stl"/></geometry></visual>
-<inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<link name="arm"><visual><origin xyz="0 0 0.1"/><geometry><mesh filename="rod.stl"/></geometry></visual>
-<inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
-<joint name="elbow" type="revolute"><parent link="foot"/><child link="arm"/><origin xyz="0 0 0.2"/>
-<axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
-</robot>"""
 pytestmark = pytest.mark.browser
 
 
@@ -39,7 +32,7 @@ def chromium():
     with sync_playwright() as driver:
         browser = driver.chromium.launch(
             executable_path=shutil.which("chromium"),
-            args=["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
+            args=["--no-sandbox", "--enable-unsafe-swiftshader"],
         )
         yield browser
         browser.close()
@@ -75,6 +68,32 @@ def viewing(what, *words):
     assert (process.returncode, said) == (130, ["interrupted"])
 
 
+def public_robots():
+    """Files of robots with meshes: one of PyBullet's, and one of a folder named by ``SCREWKIN_ROBOTS``."""
+    bullet = find_spec("pybullet_data")
+    folders = list(bullet.submodule_search_locations or ()) if bullet else []
+    files = [Path(folder) / "kuka_iiwa" / "model.urdf" for folder in folders]
+    files.append(Path(os.environ.get("SCREWKIN_ROBOTS", "")) / "bolt_description" / "robots" / "bolt.urdf")
+    return [file for file in files if file.is_file()]
+
+
+def robot_of(what):
+    """A robot by name or file."""
+    import screwkin as sk
+
+    return sk.load_robot(what)
+
+
+def link_below(name, joint):
+    """The link that a joint carries."""
+    return next(each.child for each in robot_of(name).tree if each.name == joint)
+
+
+def link_above(name, joint):
+    """The link that carries a joint."""
+    return next(each.parent for each in robot_of(name).tree if each.name == joint)
+
+
 def reads(page, pattern):
     """The first text of the page that fits a pattern, waited for."""
     script = "pattern => new RegExp(pattern).test(document.body.innerText)"
@@ -86,9 +105,15 @@ def tab(page, name):
     page.get_by_role("tab", name=name).click(force=True)
 
 
+def slider(page, label):
+    """The row of a slider by its label, whose long words may be broken."""
+    return page.locator(f"xpath=//label[.='{label}']/ancestor::*[.//*[@role='slider']][1]")
+
+
 def drag(page, label, share):
     """Drag the slider of a label to a share of its range, as a hand does."""
-    row = page.locator(f"label:text-is('{label}')").locator("xpath=ancestor::*[.//*[@role='slider']][1]")
+    row = slider(page, label)
+    row.scroll_into_view_if_needed()
     box = row.locator("[role=slider]").locator("xpath=..").bounding_box()
     thumb = row.locator("[role=slider]").bounding_box()
     y = thumb["y"] + thumb["height"] / 2
@@ -110,12 +135,43 @@ def coloured(page):
     return (np.ptp(pixels, axis=2) > 40).mean() > 0.003
 
 
+def place(page, link):
+    """Position of a link in the scene of the page itself, before its world is moved along with it."""
+    data = page.evaluate("name => window.__viserMutable.nodePoseData[name]", f"/world/robot/{link}")
+    return [*data["position"], *data["wxyz"]]
+
+
+def moves(page, link, act):
+    """Whether a link is elsewhere in the scene after something was done, waited for."""
+    was = place(page, link)
+    act()
+    page.wait_for_function(
+        """([name, was]) => { const at = window.__viserMutable.nodePoseData[name];
+        return [...at.position, ...at.wxyz].some((x, i) => Math.abs(x - was[i]) > 1e-3); }""",
+        arg=[f"/world/robot/{link}", was],
+        polling=300,
+    )
+    return was, place(page, link)
+
+
+def value(page, label):
+    """The number beside a slider."""
+    return float(slider(page, label).locator("input").first.input_value())
+
+
+def opened(page, url):
+    """The page with its scene put up."""
+    page.goto(url)
+    page.wait_for_function("window.__viserMutable?.nodePoseData['/world/floor']", polling=300)
+
+
 def test_a_walk_plays_and_another_stride_is_planned(page):
     with viewing("bioloid", "--steps", "2") as url:
-        page.goto(url)
+        opened(page, url)
         reads(page, r"planned: [\d.]+ m in [\d.]+ s, margin at least [\d.]+ mm")
         first = reads(page, r"ZMP x (-?[\d.]+) mm, y -?[\d.]+ mm; margin [\d.]+ mm; t 0\.00 s")
-        page.get_by_role("button", name="play", exact=True).click(force=True)
+        play = page.get_by_role("button", name="play", exact=True)
+        moves(page, "right_foot_link", lambda: play.click(force=True))
         later = reads(page, r"ZMP x (-?[\d.]+) mm, y -?[\d.]+ mm; margin [\d.]+ mm; t [1-9][\d.]* s")
         assert float(later[1]) > float(first[1])
         assert coloured(page)
@@ -126,27 +182,54 @@ def test_a_walk_plays_and_another_stride_is_planned(page):
         assert float(after) < float(before), "shorter steps"
 
 
+def test_the_joint_of_a_robot_is_dragged_and_what_it_carries_moves(page):
+    with viewing("bioloid", "--steps", "1") as url:
+        opened(page, url)
+        reads(page, "margin at least")
+        tab(page, "joints")
+        below, above = link_below("bioloid", "right_knee"), link_above("bioloid", "right_knee")
+        stays = place(page, above)
+        was, now = moves(page, below, lambda: drag(page, "right_knee [rad]", 0.9))
+        assert was != now
+        assert place(page, above) == stays
+        home = page.get_by_role("button", name="back home")
+        moves(page, below, lambda: home.click(force=True))
+
+
 def test_a_linkage_follows_the_joint_that_is_dragged(page):
     with viewing("linkages/four-bar") as url:
-        page.goto(url)
+        opened(page, url)
         tab(page, "joints")
-        rocker = page.locator("label:text-is('rocker [rad]')")
-        row = rocker.locator("xpath=ancestor::*[.//*[@role='slider']][1]")
-        was = row.locator("input").first.input_value()
-        drag(page, "crank [rad]", 0.75)
-        page.wait_for_timeout(3000)
-        assert row.locator("input").first.input_value() != was
+        was = value(page, "rocker [rad]")
+        moves(page, link_below("linkages/four-bar", "rocker"), lambda: drag(page, "crank [rad]", 0.75))
+        assert value(page, "rocker [rad]") != was
 
 
-def test_a_urdf_is_shown_with_its_meshes(page, tmp_path):
-    import trimesh
-
-    trimesh.creation.box((0.05, 0.05, 0.2)).export(tmp_path / "rod.stl")
-    (tmp_path / "pole.urdf").write_text(URDF, encoding="utf-8")
-    with viewing(tmp_path / "pole.urdf") as url:
-        page.goto(url)
-        reads(page, "no motion yet")
+@pytest.mark.parametrize("file", public_robots(), ids=lambda file: file.name)
+def test_an_imported_robot_is_shown_with_its_meshes_and_its_joints_are_dragged(page, file):
+    with viewing(file) as url:
+        opened(page, url)
+        assert len(page.evaluate("Object.keys(window.__viserMutable.nodePoseData)")) > 10
         page.wait_for_timeout(4000)
+        assert coloured(page)
+        joint = next(joint for joint in robot_of(file).joints if joint.type == "revolute")
+        tab(page, "joints")
+        moves(page, joint.child, lambda: drag(page, f"{joint.name} [rad]", 0.8))
+
+
+def test_axes_frames_and_circuits_are_put_up_on_demand(page):
+    with viewing("bioloid", "--steps", "1") as url:
+        opened(page, url)
+        reads(page, "margin at least")
+        tab(page, "show")
+        names = "Object.keys(window.__viserMutable.nodePoseData).join(' ')"
+        assert "/axis " not in page.evaluate(names)
+        for label, part in (("screw axes", "/axis right_knee"), ("frames", "/frame right_foot")):
+            page.get_by_label(label, exact=True).click(force=True)
+            page.wait_for_function(f"{names}.includes('{part}')", polling=300)
+        page.get_by_label("circuit").click(force=True)
+        page.get_by_role("option", name="right_leg").click(force=True)
+        page.wait_for_function(f"{names}.includes('/world/circuit/real')", polling=300)
         assert coloured(page)
 
 
