@@ -22,9 +22,9 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from benchmarks.environments import ROOT
 from benchmarks.machine import description, pin_threads
 
+ROOT = Path(__file__).resolve().parents[1]
 SECONDS, ROUNDS = 5.0, 3
 MESHES = 19
 """Of viser's example: as many as the robot has links."""
@@ -95,7 +95,7 @@ def served(*words: str) -> Iterator[tuple[str, int, Row]]:
         text += process.stdout.readline()
     ready = {"wall_s": time.monotonic() - began, "processor_s": processor_time(process.pid)}
     try:
-        yield json.loads(text)["url"], process.pid, ready
+        yield json.loads(text[text.index("{") :])["url"], process.pid, ready
     finally:
         process.terminate()
         process.wait(20)
@@ -182,11 +182,13 @@ def viser_example(shadows: bool) -> None:
 def page_of(starts: dict[str, Row], planning: Row, pictures: dict[str, Row]) -> str:
     """The results as Markdown."""
     machine = description(["viser", "playwright"])
+    first = hasattr(os, "sched_getscheduler") and os.sched_getscheduler(0) == os.SCHED_RR
+    others = f"load {machine['load']}" + (" of processes that had to wait (`chrt -r 1`)" if first else "")
     lines = [
         "# The viewer",
         "",
         f"`python -m benchmarks.viewing` on {machine['processor']}, {machine['cores']} cores, one-minute "
-        f"load {machine['load']}; no graphics card: Chromium draws by the processor (800 x 600). "
+        f"{others}; no graphics card: Chromium draws by the processor (800 x 600). "
         f"Medians of {ROUNDS}.",
         "",
         "| ready | wall [s] | processor [s] |",
