@@ -1,4 +1,4 @@
-"""The shell blocks of README and docs are run as they stand, or shorter; or the reason why not stands here."""
+"""The shell blocks of README and docs are run as they stand, or shorter; or a reason why not stands here."""
 
 from __future__ import annotations
 
