@@ -12,7 +12,7 @@ import typer
 
 import screwkin as sk
 from screwkin.analysis.verdict import Criteria, Measured, Verdict
-from screwkin.cli import VERBS, verb_app
+from screwkin.cli import OPTIONS, VERBS, verb_app
 from screwkin.files import atomic_write
 from screwkin.gait.keypoints import CHANNELS
 from screwkin.gait.keys import KEYS
@@ -37,8 +37,9 @@ the two of the feet. `swing` holds for the swinging foot only, `advance` gains o
 changes its sign with every step, `repeat` does not."""
 COMMANDS_BEGIN = """\
 Exit codes: 0 good; 1 unexpected; 2 bad input or usage; 3 the answer is no; 4 refused for safety; 130
-interrupted. `--json` prints one JSON object and nothing else; `--debug` shows the traceback of an error;
-`-o DIR` says where files go."""
+interrupted. `--json` prints one JSON object and nothing else; `-o DIR` says where files go. Tables and texts fold
+at blanks in narrow terminals; a name that is nearly right is answered by the right one; Ctrl-C leaves whole files
+only. These may stand anywhere in a line, or stand alone:"""
 
 CHANNEL_MEANINGS = {
     "foot_progress": "share of the way from foothold to foothold",
@@ -56,15 +57,42 @@ LENGTH_MEANINGS = {
     "arm": "from shoulder to hand, stretched",
 }
 PREVIEW_MEANINGS = {
-    "dsp": "share of Tc with both feet on the floor",
-    "horizon": "how far the controller looks ahead [s]",
-    "Qe": "weight of the ZMP error",
-    "Qx": "weight of changes of the state",
-    "R": "weight of changes of the jerk",
-    "ahead": "how far the ZMP lies ahead of the ankle, as a share of the sole's middle; by default 1",
-    "inward": "share of the way from the sole's middle to its inner edge; by default 0",
-    "stand": "steps during which the robot stands before the first step and after the last; by default 1",
+    "dsp": ("share of Tc with both feet on the floor", "must be given; 0.2"),
+    "horizon": ("how far the controller looks ahead [s]", "must be given; 1.6"),
+    "Qe": ("weight of the ZMP error", "must be given; 1"),
+    "Qx": ("weight of changes of the state", "must be given; 0"),
+    "R": ("weight of changes of the jerk", "must be given; 1e-6"),
+    "ahead": ("how far the ZMP lies ahead of the ankle, as a share of the sole's middle", "`1`"),
+    "inward": ("share of the way from the sole's middle to its inner edge", "`0`"),
+    "stand": ("steps during which the robot stands before the first step and after the last", "`1`"),
 }
+"""Parameters of gaits of kind preview: meaning, and default or usual value."""
+SMALL_GAIT = """\
+[gait]
+name = "small"
+kind = "preview"
+Tc = 0.8
+stride = "0.3*leg"
+lift = "0.06*leg"
+waist_height = "0.92*leg + waist"
+hand_drop = "arm"
+
+[parameters]
+dsp = 0.2
+horizon = 1.6
+Qe = 1
+Qx = 0
+R = 1e-6
+
+[channel.foot_progress]
+at = ["dsp", 1]
+value = [0, 1]
+
+[channel.foot_height]
+at = ["dsp", "(1 + dsp)/2", 1]
+value = [0, "lift", 0]
+"""
+"""A whole gait; a test lets bundled bipeds walk it."""
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
@@ -141,18 +169,19 @@ def gaits() -> str:
     channels = [(f"`{name}`", CHANNEL_MEANINGS[name], kind) for name, kind in CHANNELS.items()]
     lengths = [(f"`{name}`", LENGTH_MEANINGS[name]) for name in NOMINAL]
     preview = [
-        (f"`{name}`", PREVIEW_MEANINGS[name]) for name in dict.fromkeys([*SETTINGS, *PREVIEW_MEANINGS])
+        (f"`{name}`", *PREVIEW_MEANINGS[name]) for name in dict.fromkeys([*SETTINGS, *PREVIEW_MEANINGS])
     ]
     return "\n\n".join(
         [
             "# Gait files",
             GAITS_BEGIN,
+            f"A whole gait file, for any biped:\n\n```toml\n{SMALL_GAIT}```",
             "## [gait]",
             table(("key", "what", "unit", "default"), rows),
             "## [parameters]",
             "Numbers of your own, for formulas anywhere in the file. Gaits of kind `preview` and "
             "`footsteps` read these:",
-            table(("parameter", "what"), preview),
+            table(("parameter", "what", "default, or usual"), preview),
             "## Lengths of the robot",
             "Formulas may use lengths of the robot at hand, so that one gait fits many: "
             '`stride = "0.3*leg"`. A walk writes their values to `[lengths]`.',
@@ -171,6 +200,7 @@ def commands() -> str:
     parts = [
         "# Command line",
         COMMANDS_BEGIN,
+        table(("option", "what"), [(code(name), text) for name, text in OPTIONS.items()]),
     ]
     return "\n\n".join(
         [

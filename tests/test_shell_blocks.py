@@ -25,7 +25,7 @@ PAGES = ["README.md", "CONTRIBUTING.md", "benchmarks/README.md"] + [
 ]
 REASONS = {
     r"\.venv/bin/(uv )?pip install|python3(\.11)? -m venv": "installs: .ci/run and .ci/smoke run it",
-    r"^pip install": "installs",
+    r"^pip install|activate$|--install-completion": "changes the installation, or the user's shell",
     r"sphinx": ".ci/run builds the site",
     r"pytest": "the tests themselves",
     r"ruff|mypy": ".ci/run runs it",

@@ -60,6 +60,15 @@ def test_every_key_of_a_gait_has_meaning_and_default(references: ModuleType) -> 
     assert {*KEYS} <= {*Gait.__dataclass_fields__}
 
 
+@pytest.mark.parametrize("robot", ["poppy12", "bioloid"])
+def test_bipeds_walk_the_gait_of_the_page(references: ModuleType, tmp_path: Path, robot: str) -> None:
+    path = tmp_path / "small.toml"
+    path.write_text(references.SMALL_GAIT, encoding="utf-8")
+    loaded = sk.load_robot(robot)
+    assert sk.zmp(loaded, sk.walk(loaded, sk.load_gait(path), 2)).margin.min() > 0.005
+    assert references.SMALL_GAIT in references.gaits()
+
+
 def test_every_verb_and_option_stands_on_the_page_of_commands(references: ModuleType) -> None:
     page = references.commands()
     for verb in VERBS:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -103,11 +104,11 @@ def aligned(rows: Sequence[Sequence[Any]], indent: str = "") -> str:
 
 @contextmanager
 def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
-    """A bar, percent and remaining time on stderr while it is a terminal, else, or if --quiet, nothing.
+    """A bar, percent and remaining time on stderr while it is a terminal that can draw it, and not --quiet.
 
     Yields a function that takes the share done.
     """
-    if manners().quiet or not sys.stderr.isatty():
+    if manners().quiet or not sys.stderr.isatty() or os.environ.get("TERM") in ("dumb", "unknown"):
         yield lambda share: None
         return
     from rich.console import Console

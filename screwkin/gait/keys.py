@@ -39,7 +39,7 @@ def _choice(meaning: str, *choices: str) -> Key:
 
 
 _TEXTS = {
-    "name": Key("name of the gait", default="the file's"),
+    "name": Key("name of the gait"),
     "description": Key("one sentence", default=""),
     "source": Key("where it comes from", default=""),
 }
@@ -82,7 +82,11 @@ _NUMBERS = {
     "turn": Key("turn of a foot per swing, to the left", "rad", 0.0),
     "lift": Key("height of a swing", "m", within="above 0"),
     "waist_height": Key("height of the waist above the floor", "m", within="above 0"),
-    "hand_drop": Key("how far hands hang below their shoulders", "m", within="above 0"),
+    "hand_drop": Key(
+        "how far hands hang below their shoulders; `arm` suits any robot, one without arms too",
+        "m",
+        within="above 0",
+    ),
     "sway": Key("factor on the lateral motion of the waist", "", 1.0),
     "spread": Key("added to each foot's distance from the middle", "m", 0.0),
     "ramp": Key("steps over which the gait starts and stops; 0: at once", "steps", 1.0, within="at least 0"),

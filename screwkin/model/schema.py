@@ -194,10 +194,12 @@ class SoleRow(Row):
 
 
 class PostureRow(Row):
-    """[[posture]]: joint positions by name; joints left out are at 0."""
+    """[[posture]]: joint positions by name; joints left out are at 0. Walks begin at the one named `home`."""
 
     name: Name = Field(description="name of the posture")
-    base_height: Value | None = Field(None, description="height of the base above the floor in m")
+    base_height: Value | None = Field(
+        None, description="height of the base above the floor in m; must be given where the base floats"
+    )
     q: dict[str, Value] = Field({}, description="{ joint = position, ... } in rad or m")
 
 
