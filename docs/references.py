@@ -8,6 +8,7 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 from typing import Any
 
+import gallery  # beside this file
 import typer
 
 import screwkin as sk
@@ -37,9 +38,9 @@ the two of the feet. `swing` holds for the swinging foot only, `advance` gains o
 changes its sign with every step, `repeat` does not."""
 COMMANDS_BEGIN = """\
 Exit codes: 0 good; 1 unexpected; 2 bad input or usage; 3 the answer is no; 4 refused for safety; 130
-interrupted. `--json` prints one JSON object and nothing else; `-o DIR` says where files go. Tables and texts fold
-at blanks in narrow terminals; a name that is nearly right is answered by the right one; Ctrl-C leaves whole files
-only. These may stand anywhere in a line, or stand alone:"""
+interrupted. `--json` prints one JSON object and nothing else; `-o DIR` says where files go. Tables and texts
+fold at blanks in narrow terminals; a name that is nearly right is answered by the right one; Ctrl-C leaves
+whole files only. Options that stand alone, or anywhere in a line:"""
 
 CHANNEL_MEANINGS = {
     "foot_progress": "share of the way from foothold to foothold",
@@ -297,6 +298,7 @@ def _auto(name: str, kind: str) -> str:
 
 
 PAGES: Mapping[str, Any] = {
+    "gallery": gallery.page,
     "tables": robot_tables,
     "gaits": gaits,
     "command-line": commands,

@@ -94,7 +94,7 @@ _HOMES = {
 }
 _HOME_OF = {name: f"screwkin.{module}" for module, names in _HOMES.items() for name in names.split()}
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 __all__ = [
     "Balance",
     "ContactPatch",

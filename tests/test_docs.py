@@ -30,6 +30,25 @@ def test_links_between_pages_and_pictures_lead_somewhere(page: str) -> None:
     assert not missing
 
 
+@pytest.mark.parametrize(
+    ("figure", "page", "there"),
+    [
+        ("99.6 ns", "docs/performance.md", "| 99.6 ns |"),
+        ("143 ns", "docs/performance.md", "| 143 ns |"),
+        ("2.57 µs", "docs/performance.md", "| 2.57 µs |"),
+        ("578 ns", "docs/performance.md", "578 ns, all solutions"),
+        ("56.8 µs", "docs/performance.md", "56.8 µs, damped least squares"),
+        ("200 of 200 agree", "benchmarks/results/verdicts.md", "| table | 100 | 100 |"),
+        ("32 of 49 files", "docs/robots.md", "32 of 49 files"),
+        ("1 of 60", "docs/walking.md", "| 1 of 60 | 15 of 60 "),
+        ("197 of 200", "tests/servo/mutants.md", "Of the 200\nthat seed 0 draws 197 are"),
+    ],
+)
+def test_figures_of_the_readme_stand_on_the_pages_that_it_names(figure: str, page: str, there: str) -> None:
+    assert figure in (ROOT / "README.md").read_text(encoding="utf-8")
+    assert there in (ROOT / page).read_text(encoding="utf-8")
+
+
 @pytest.mark.parametrize(("number", "python"), [(0, "python3"), (1, "python3.11"), (2, "python3")])
 def test_the_first_commands_of_the_readme_each_stand_on_their_own(number: int, python: str) -> None:
     """In a fresh clone: they make the environment that they use. The second one is what ``.ci/run`` runs."""

@@ -23,11 +23,14 @@ DOCS = Path(__file__).parents[1] / "docs"
 
 @pytest.fixture(scope="module")
 def references() -> ModuleType:
+    monkeypatch = pytest.MonkeyPatch()
+    monkeypatch.syspath_prepend(DOCS)
     spec = importlib.util.spec_from_file_location("references", DOCS / "references.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
+    monkeypatch.undo()
     return module
 
 
@@ -79,6 +82,14 @@ def test_every_verb_and_option_stands_on_the_page_of_commands(references: Module
                 if parameter.param_type_name == "option" and not parameter.hidden:
                     assert parameter.opts[0] in page
                     assert parameter.help, (verb, parameter.name)
+
+
+def test_every_picture_of_the_gallery_is_there(references: ModuleType) -> None:
+    page = references.PAGES["gallery"]()
+    images = re.findall(r"!\[[^\]]+\]\(\.\./([^)]+)\)", page)
+    assert len(images) > 4
+    assert all((DOCS / image).is_file() for image in images)
+    assert {path.stem for path in (DOCS / "images" / "gallery").iterdir()} == {Path(i).stem for i in images}
 
 
 @pytest.mark.parametrize("written", ["records", "functions"])

@@ -19,6 +19,7 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+import screwkin
 from screwkin.model.library import gait_names, robot_names
 
 CHECKOUT = Path(__file__).resolve().parent.parent
@@ -125,6 +126,14 @@ def test_the_long_description_leads_nowhere_outside_the_repository(metadata):
     assert "Read on" in text
     links = re.findall(r"\]\(([^)]*)\)", text)
     assert all(link.startswith(("https:", "http:")) for link in links), links
+
+
+def test_the_version_is_one_everywhere(metadata):
+    cited = re.search(
+        r"^version: (\S+)$", (CHECKOUT / "CITATION.cff").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    newest = re.search(r"^## (\S+)", (CHECKOUT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert {metadata["Version"], cited[1], newest[1]} == {screwkin.__version__}
 
 
 SMALL = CHECKOUT / "requirements-small.txt"
