@@ -120,7 +120,7 @@ def robot() -> Panel:
 
 
 def screw() -> Panel:
-    """Right: a screw axis with pitch, the helix of a point, and the twist told at the origin."""
+    """Right: a screw axis with pitch, the helix of a point, and the twist taken at the origin."""
     p = Panel((640, 300), 330)
     s = np.array([-0.2, 0.2, 0.93])
     s /= np.linalg.norm(s)

@@ -1,6 +1,6 @@
 """Define a robot by a screw table, and check its kinematics by hand.
 
-One row a joint: a unit axis `s` and any point `s0` on it, told in the base frame with the robot in its zero
+One row a joint: a unit axis `s` and any point `s0` on it, given in the base frame with the robot in its zero
 pose. Here: a leg of three joints hanging from a bench. No joint frames appear anywhere.
 """
 

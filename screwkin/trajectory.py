@@ -306,7 +306,7 @@ def check_joints(robot: Robot, joint_names: Sequence[str], what: str = "the traj
         return
     missing = [name for name in robot.joint_names if name not in joint_names]
     foreign = [name for name in joint_names if name not in robot.joint_names]
-    faults = [f"it lacks {', '.join(missing)}"] if missing else []
+    faults = [f"it is without {', '.join(missing)}"] if missing else []
     faults += [f"it has the foreign {', '.join(foreign)}"] if foreign else []
     reason = " and ".join(faults) or "they stand in another order"
     raise InputError(
@@ -381,7 +381,7 @@ def _from_arrays(arrays: Mapping[str, NDArray[Any]]) -> Trajectory:
     }
     foreign = [key for key in arrays if key not in names and not key.startswith(TIP_PREFIX)]
     if missing or foreign:
-        found = [f"it lacks {', '.join(missing)}"] if missing else []
+        found = [f"it is without {', '.join(missing)}"] if missing else []
         found += [f"it holds the unknown {', '.join(foreign)}"] if foreign else []
         raise TrajectoryError(f"not a trajectory of screwkin: {' and '.join(found)}")
     rest: dict[str, Any] = {name: arrays[name] for name in names}

@@ -213,7 +213,7 @@ def test_missing_and_unknown_keys_are_named(tmp_path: Path) -> None:
     fields = npz_fields(a_walk().save(tmp_path / "walk.npz"))
     del fields["zmp"], fields["qd"]
     np.savez(tmp_path / "other.npz", **fields, photo=np.zeros(3))
-    with pytest.raises(TrajectoryError, match=r"lacks qd, zmp and it holds the unknown photo"):
+    with pytest.raises(TrajectoryError, match=r"is without qd, zmp and it holds the unknown photo"):
         load_trajectory(tmp_path / "other.npz")
 
 
@@ -273,9 +273,9 @@ def test_joints_must_be_those_of_the_robot_in_its_order() -> None:
     names = robot.joint_names
     check_joints(robot, names)
     for given, reason in (
-        (names[1:], f"it lacks {names[0]}; give"),
+        (names[1:], f"it is without {names[0]}; give"),
         ((*names, "x0"), "it has the foreign x0; give"),
-        (("x0", *names[1:]), f"it lacks {names[0]} and it has the foreign x0"),
+        (("x0", *names[1:]), f"it is without {names[0]} and it has the foreign x0"),
         (names[::-1], "they stand in another order"),
     ):
         with pytest.raises(InputError, match=f"the log's joints are not those of poppy12: ({reason})"):

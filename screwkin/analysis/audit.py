@@ -1,4 +1,4 @@
-"""What is doubtful in a robot: masses, inertias, limits, axes, symmetry, soles, loops, what simulators do.
+"""An audit of a robot: masses, inertias, limits, axes, symmetry, soles, loops, what simulators do.
 
 Nothing is mended here: every remark says where, what and what to do about it.
 """
@@ -32,7 +32,7 @@ _GRAVITY = 9.81
 
 
 def audit(robot: Robot) -> tuple[Remark, ...]:
-    """Everything that is doubtful in a robot, worst first.
+    """All remarks on a robot, worst first.
 
     Args:
         robot: of numbers, from a table or a URDF.

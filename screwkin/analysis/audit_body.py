@@ -1,4 +1,4 @@
-"""What is doubtful in a robot as a whole: axes, symmetry of limbs, soles, loops and links that touch."""
+"""Remarks on a robot as a whole: axes, symmetry of limbs, soles, loops and links that touch."""
 
 from __future__ import annotations
 

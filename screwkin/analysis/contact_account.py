@@ -32,7 +32,7 @@ PRESSING = 0.05
 
 @dataclass(frozen=True, eq=False)
 class ForceAccount:
-    """What feet and joints of a trajectory have to bear.
+    """Wrenches of feet and efforts of joints along a trajectory.
 
     Attributes:
         account: of the trajectory.
@@ -58,14 +58,14 @@ class ForceAccount:
 
     @cached_property
     def friction(self) -> Array:
-        """Least coefficient of friction (T, feet) that holds every foot; NaN where it bears nothing."""
+        """Least coefficient of friction (T, feet) that holds every foot; NaN where nothing presses on it."""
         f = self.forces.wrenches[..., 3:]
         pressing = np.where(self._pressing, f[..., 2], np.nan)
         return np.asarray(np.hypot(f[..., 0], f[..., 1]) / pressing)
 
     @cached_property
     def pressure(self) -> Array:
-        """Centre of pressure (T, feet, 2) in every foot's frame [m]; NaN where it bears little."""
+        """Centre of pressure (T, feet, 2) in every foot's frame [m]; NaN where little presses on it."""
         trajectory, points = self.account.trajectory, []
         for k, foot in enumerate(self.feet):
             R = trajectory.T_world_tip[foot][:, :3, :3].swapaxes(-1, -2)

@@ -170,8 +170,8 @@ def _moved(
         }
         solution = close_loops(mechanism, state, here)
         if solution.residual > CLOSED:
-            told = ", ".join(f"{name} = {x:.6g}" for name, x in here.items())
-            raise UnreachableError(f"{robot.name}: the loops do not close at {told}; impose less")
+            there = ", ".join(f"{name} = {x:.6g}" for name, x in here.items())
+            raise UnreachableError(f"{robot.name}: the loops do not close at {there}; impose less")
         state = solution.state
     return [float(x) for x in state.q]
 

@@ -1,4 +1,4 @@
-"""A doubt about a robot: what an audit says."""
+"""A remark on a robot: what an audit says."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ LEVELS: tuple[Level, ...] = ("error", "warning", "info")
 
 @dataclass(frozen=True)
 class Remark:
-    """One doubt: its level, the place in the robot, what stands there, and what to do."""
+    """One remark: its level, the place in the robot, what stands there, and what to do."""
 
     level: Level
     place: str

@@ -19,7 +19,7 @@ from screwkin.anatomy.symmetry import FINEST, PLACE, Symmetry
 from screwkin.model.robot import Robot
 
 SURE = {"flat": 0.95, "edge": 0.6, "point": 0.5}
-"""How sure a sole is by its kind: meshes of flat feet are flat, points and edges may be what a mesh lacks."""
+"""How sure a sole is by its kind: meshes of flat feet are flat, points and edges may be gaps of a mesh."""
 LOST_PER_DEGREE = 0.01
 """What a degree of tilt takes from that."""
 GUESSED = 0.3

@@ -34,7 +34,7 @@ def virtual(
     ] = None,
     return_delay: Annotated[float, typer.Option(help="From command to answer [microseconds].")] = 500.0,
     inject_fault: Faults = None,
-    trouble: FormerFaults = None,
+    former: FormerFaults = None,
     seed: Seed = 0,
     seconds: Annotated[
         float | None, typer.Option(help="End after this time; default: when interrupted.")
@@ -49,7 +49,7 @@ def virtual(
     q = None if posture is None else table.posture(posture).q
     servos = virtual_servos(table, q, stiffness, 1e-6 * return_delay)
     start = clock.now()
-    bus = VirtualBus(servos, clock, mapped.baud, injected_faults(inject_fault, trouble, start=start), seed)
+    bus = VirtualBus(servos, clock, mapped.baud, injected_faults(inject_fault, former, start=start), seed)
     with PseudoTerminal(bus) as terminal, _linked(link, terminal.path) as port:
         facts = {"port": port, "robot": table.name, "servos": len(servos), "protocol": mapped.protocol}
         if as_json:

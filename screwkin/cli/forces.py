@@ -75,7 +75,7 @@ def forces(
     output: OutputFolder = None,
     as_json: AsJson = False,
 ) -> int:
-    """Of a robot what balances loads, by Davies' method; of a trajectory what feet and joints bear along it.
+    """Of a robot what balances loads, by Davies' method; of a trajectory the forces of feet and joints.
 
     A trajectory's forces go to forces.npz and pictures, beside those of the simulator that validated it. Exit
     code 3 where no forces within friction carry the motion.

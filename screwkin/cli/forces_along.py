@@ -1,4 +1,4 @@
-"""``screwkin forces TRAJ``: what feet and joints bear along a trajectory."""
+"""``screwkin forces TRAJ``: forces of feet and efforts of joints along a trajectory."""
 
 from __future__ import annotations
 

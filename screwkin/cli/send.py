@@ -65,7 +65,7 @@ def send(
     ] = "",
     rs485: Annotated[bool, typer.Option("--rs485", help="Let the kernel switch direction.")] = False,
     inject_fault: Faults = None,
-    trouble: FormerFaults = None,
+    former: FormerFaults = None,
     seed: Seed = 0,
     output: OutputFolder = None,
     as_json: AsJson = False,
@@ -80,7 +80,7 @@ def send(
         raise InputError("--port and --virtual are two buses; choose one")
     if go and not (port or virtual):
         raise InputError("--go needs a bus: --port /dev/ttyUSB0, or --virtual")
-    faults = injected_faults(inject_fault, trouble)
+    faults = injected_faults(inject_fault, former)
     if faults and not virtual:
         raise InputError("--inject-fault is for virtual servos; add --virtual")
     settings = PlaySettings(

@@ -1,4 +1,4 @@
-"""What elastic drives must be told so that their joints stand where they should: for a control cycle."""
+"""Commands of elastic drives, so that their joints stand where they should: for a control cycle."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ class ContactPatch:
 
     Attributes:
         tip: of a limb.
-        points: in the frame of the tip [m]: one, which bears no moment, or at least three that are not in
+        points: in the frame of the tip [m]: one, which transmits no moment, or at least three that are not in
             line; none: the corners of its sole, else the tip itself.
         friction: coefficient of friction; None: it holds any force, as a firm grip does.
         normal: unit vector in the frame of the tip, from what carries it into the robot.
@@ -168,7 +168,7 @@ def contact_distribution(
 
     Returns:
         ``wrenches`` (..., patches, 6): [m; f] on every tip about its origin, world axes [N m, N]; ``efforts``
-        (..., n) [N m or N]; ``spread`` (...): 0 (or NaN) where the points in contact cannot bear any wrench.
+        (..., n) [N m or N]; ``spread`` (...): 0 (or NaN) where the points in contact can transmit no wrench.
     """
     if robot.base == "fixed":
         raise InputError(
@@ -209,7 +209,7 @@ def contact_distribution(
 
 
 def _bearable(robot: Robot, patch: ContactPatch, carrier: _Carrier, wish: Wrench) -> Wrench:
-    """What of a wished wrench a patch can bear: none where it is not in contact, at one point no moment."""
+    """What of a wished wrench a patch can transmit: none out of contact, at one point no moment."""
     on = where(carrier.weight > 0, 1.0, 0.0)
     force = wish.f * on
     if len(contact_points(robot, patch)) > 1:

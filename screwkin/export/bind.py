@@ -218,7 +218,7 @@ class Bound:
         for source, of in self._reads:
             value = arrays.get(source)
             if of and source in arrays and not (isinstance(value, Mapping) and of in value):
-                reasons.append(f"{source} lacks {of}")
+                reasons.append(f"{source} is without {of}")
         if reasons:
             raise InputError("; ".join(reasons))
 

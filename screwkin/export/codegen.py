@@ -76,8 +76,8 @@ def programs_of(robot: Robot, kinds: Sequence[str]) -> list[Program]:
             raise UnknownNameError("kind of program", kind, tuple(KINDS))
         made = KINDS[kind](robot)
         if not made:
-            lacks = "limb with a closed form" if kind == "ik" else "limb"
-            raise InputError(f"{robot.name} has no {lacks}, which {kind} needs")
+            limb = "limb with a closed form" if kind == "ik" else "limb"
+            raise InputError(f"{robot.name} has no {limb}, which {kind} needs")
         for program in made:
             if found.setdefault(program.name, program) is not program:
                 raise InputError(

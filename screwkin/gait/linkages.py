@@ -14,7 +14,7 @@ from screwkin.mechanism.linkages import Linkage, linkages
 from screwkin.model.robot import Robot
 
 NEAR = np.deg2rad(10.0)
-"""Way to a dead point from which the reader of a walk is told of it [rad or m]."""
+"""Way to a dead point from which a walk names it [rad or m]."""
 LEAST = np.deg2rad(2.0)
 """Way to a dead point below which a walk is refused: play in the joints may take a linkage across."""
 BETWEEN = 16

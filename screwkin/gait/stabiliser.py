@@ -109,7 +109,7 @@ class _Seen:
 
 
 def _measured(body: WalkingBody, rhythm: Rhythm, memory: Memory, senses: Sensed, swings: Scalar) -> _Seen:
-    """Where the CoM is, by the foot that bears: the stance foot, or the other where that is in the air."""
+    """Where the CoM is, by the foot that supports: the stance foot, or the other where that is in the air."""
     D = link_displacements(body.robot, senses.q)
     com = senses.attitude @ mass_center(body.robot, D)
     left = memory.side > 0.0

@@ -96,7 +96,7 @@ def closed_form(chain: SerialChain, position: bool = False, family: str | None =
         family: only this one.
 
     Raises:
-        InputError: its geometry has none; the message says what each family lacks.
+        InputError: its geometry has none; the message says why it is of no family.
     """
     n = len(chain.screws)
     if n in (4, 5) and not position and chain.turning.all():
@@ -109,14 +109,14 @@ def closed_form(chain: SerialChain, position: bool = False, family: str | None =
         kinds = f"{n} joints{mixed}"
         needed = " or ".join(_COUNTS.get(j, str(j)) for j in sorted({row.joints for row in rows}))
         raise InputError(f"{what}: it has {kinds}; {needed} revolute joints are needed. Use a numeric method")
-    lacks = []
+    reasons = []
     for row in fitting:
-        for backwards, label in enumerate(row.lacks):
+        for backwards, label in enumerate(row.reasons):
             formulas = row.recognise(chain.reversed if backwards else chain)
             if isinstance(formulas, Formulas):
                 return ClosedForm(chain, row.name, bool(backwards), position, formulas)
-            lacks.append(f"{label}: {'; '.join(formulas)}")
-    raise InputError(f"{what}. {'. '.join(lacks)}. Use a numeric method")
+            reasons.append(f"{label}: {'; '.join(formulas)}")
+    raise InputError(f"{what}. {'. '.join(reasons)}. Use a numeric method")
 
 
 _COUNTS = {3: "three", 6: "six"}

@@ -36,14 +36,14 @@ class Family:
 
     Attributes:
         name: of the family.
-        lacks: how messages begin that say why a chain is none, and why the chain walked from its tip is none.
+        reasons: how messages begin of a chain that is none, walked from its root and from its tip.
         recognise: from a chain to its formulas, or to the faults that keep it from being of the family.
         joints: number of revolute joints.
         position: the target is the tip's position, not its pose.
     """
 
     name: str
-    lacks: tuple[str, ...]
+    reasons: tuple[str, ...]
     recognise: Callable[[SerialChain], Formulas | list[str]]
     joints: int = 6
     position: bool = False

@@ -72,7 +72,7 @@ def limb_ik(
         UnknownNameError: no such limb.
         ShapeError: wrong shape, NaN or infinity, or a pose that is not rigid.
         InputError: an unknown method, or one that does not fit the limb (for
-            ``"closed"`` the message says what the limb's geometry lacks); JAX arrays, and loops; or a closure
+            ``"closed"`` the message says why there is none); JAX arrays, and loops; or a closure
             that holds the tip to another limb's.
 
     Example:

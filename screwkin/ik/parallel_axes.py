@@ -31,7 +31,7 @@ STEPS = 3
 
 
 def recognise(chain: SerialChain) -> Formulas | list[str]:
-    """The branches of a chain whose axes 3, 4 and 5 are parallel, or what it lacks."""
+    """The branches of a chain whose axes 3, 4 and 5 are parallel, or why there are none."""
     if faults := parallel_axes_faults(chain):
         return faults
     return Formulas(

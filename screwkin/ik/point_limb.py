@@ -18,7 +18,7 @@ from screwkin.kinematics.serial_chain import SerialChain
 
 
 def recognise(chain: SerialChain) -> Formulas | list[str]:
-    """The branches of a chain whose first two axes meet in a shoulder, or what it lacks."""
+    """The branches of a chain whose first two axes meet in a shoulder, or why there are none."""
     if parallel(chain, 0, 1):
         return [f"the axes of {joint_list(chain, (0, 1))} are parallel"]
     shoulder = meeting(chain, (0, 1))

@@ -17,7 +17,7 @@ from screwkin.kinematics.serial_chain import SerialChain, per_chain
 NEARLY = 1e-4
 """Largest angle [rad] and, over the limb's size, distance at which axes count as parallel or meeting.
 
-Beyond it elimination is exact; up to it, where branches fall together is told by the relative to two digits.
+Beyond it elimination is exact; up to it, where branches fall together is known by the relative to two digits.
 """
 GROUPS = ((0, 1, 2), (3, 4, 5), (0, 1), (4, 5))
 """Neighbouring axes that closed forms want to meet."""

@@ -21,7 +21,7 @@ from screwkin.kinematics.serial_chain import SerialChain
 
 
 def recognise(chain: SerialChain) -> Formulas | list[str]:
-    """The branches of a chain with a spherical hip, or what it lacks."""
+    """The branches of a chain with a spherical hip, or why there are none."""
     faults = [
         f"the axes of {joint_list(chain, pair)} are parallel"
         for pair in ((0, 1), (1, 2))

@@ -91,7 +91,7 @@ class ActionSystem:
 
     @property
     def held(self) -> bool:
-        """True if couplings lead from the floor to every link; else nothing bears the whole robot."""
+        """True if couplings lead from the floor to every link; else nothing supports the whole robot."""
         tails = {FLOOR}
         couplings = self.graph.edges[: len(self.edges)]
         for _ in self.graph.vertices:
@@ -198,7 +198,7 @@ def constraints(joint: Joint) -> Names:
 
 
 def _ends(closure: Closure) -> tuple[str, str]:
-    """The link that exerts a closure's wrench, if possible the floor, and the one that bears it."""
+    """The link that exerts a closure's wrench, if possible the floor, and the one that it acts on."""
     ends = closure.link_b, closure.link_a
     return ends if ends[1] != FLOOR else ends[::-1]
 
@@ -284,7 +284,7 @@ def _unit(screw: Screw, u: Vector, v: Vector, component: str) -> Wrench:
 
 @kept
 def bearing_frames(robot: Robot) -> tuple[tuple[Vector, Vector, Vector], ...]:
-    """For every joint of ``robot.tree`` the point of its axis that bears, and u and v, in the zero pose.
+    """For every joint of ``robot.tree`` the point of its bearing, and u and v, in the zero pose.
 
     The point is the one nearest to the centre of all axes, so that it does not matter which point names the
     axis; where the table has symbols, it is that of the table.

@@ -2,7 +2,7 @@
 
 Both belong to the smallest singular value of the block's secondary screws. Its right vector sets links in
 motion while the primary couplings rest; its left vector is a wrench that does no work on any secondary
-coupling, so that only the primary ones bear it.
+coupling, so that only the primary ones carry it.
 
 Source: Hunt (1978), Kinematic geometry of mechanisms; Fichter (1986), A Stewart platform-based manipulator.
 """
@@ -35,8 +35,8 @@ class FreeScrews:
         body: the link that moves: of those with most couplings, the one that moves most.
         motion: its motion while the primary couplings rest.
         wrench: of a block of one circuit, the wrench that does no work on any secondary coupling: only the
-            primary ones bear it. Of more circuits, the wrench on the axis of the motion that does no work on
-            it: on this axis the couplings bear a wrench of this pitch, in more than one way, and none other.
+            primary ones carry it. Of more circuits, the wrench on the axis of the motion that does no work on
+            it: on this axis the couplings carry a wrench of this pitch, in more than one way, and none other.
     """
 
     body: str
@@ -123,7 +123,7 @@ def _moving_body(
 def _free_wrench(
     local: Array, secondary: Sequence[int], primary: Sequence[int], null: float, middle: Array, size: float
 ) -> Array | None:
-    """The wrench [m; f about the origin] that only primary couplings bear, if one circuit transmits it."""
+    """The wrench [m; f about the origin] that only primary couplings carry, if one circuit transmits it."""
     U, sigma, _ = np.linalg.svd(local[:, secondary])
     free = U[:, np.concatenate([sigma, np.zeros(len(U) - len(sigma))]) < max(null, sigma[-1] * (1 + 1e-9))]
     inner, works, _ = np.linalg.svd(free.T @ local[:, primary], full_matrices=False)

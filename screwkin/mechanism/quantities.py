@@ -94,8 +94,8 @@ def virtual_motion(
     for chain in chains:
         wanted = [name for name in chain.names if name in mechanism.primary]
         if chain.name not in given:
-            lacks = "base_twist is None" if chain.name == WAIST else f"tip_twists lacks {chain.name}"
-            raise InputError(f"{lacks}, but {', '.join(wanted)} are primary")
+            absent = "base_twist is None" if chain.name == WAIST else f"tip_twists has no {chain.name}"
+            raise InputError(f"{absent}, but {', '.join(wanted)} are primary")
         turning = any(name.split(".")[1][0] == "r" for name in wanted)
         if given[chain.name].omega is ZERO and turning:
             raise InputError(f"the twist of {chain.name} has 3 components, but its rotations are primary")

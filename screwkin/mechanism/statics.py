@@ -114,7 +114,7 @@ def static_forces(
 
     Raises:
         UnknownNameError: no such link, tip, joint or action.
-        InputError: imposed actions that equilibrium decides already, or a base that nothing bears.
+        InputError: imposed actions that equilibrium decides already, or a base that nothing supports.
         SingularError: no actions balance the loads; names the joints that would move.
         ShapeError: a wrong shape, NaN or infinity, or a base pose that is not rigid.
 
@@ -151,11 +151,11 @@ def static_forces(
 
 
 def refuse_hanging(robot: Robot, system: ActionSystem) -> None:
-    """Raise an InputError for a floating base that nothing bears."""
+    """Raise an InputError for a floating base that nothing supports."""
     if not system.held:
         raise InputError(
-            f"{robot.name} has a floating base and nothing bears it; name tips on the floor or held closures "
-            f"in contacts, such as {', '.join(robot.tip_names) or 'a closure'}"
+            f"{robot.name} has a floating base and nothing supports it; name tips on the floor or held "
+            f"closures in contacts, such as {', '.join(robot.tip_names) or 'a closure'}"
         )
 
 

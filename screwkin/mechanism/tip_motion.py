@@ -78,7 +78,7 @@ def joint_rates(
     limbs = _all_limbs(robot)
     for limb in limbs:
         if limb.tip not in tip_twists:
-            raise InputError(f"tip_twists lacks {limb.tip}")
+            raise InputError(f"tip_twists has no {limb.tip}")
         if len(robot.path_to(limb.link)) == 6 and tip_twists[limb.tip].omega is ZERO:
             raise InputError(f"the twist of {limb.tip} has 3 components, but its limb has six joints")
     D = positions.link_displacements(robot, q, Displacement(T_world_base.R, ZERO, ZERO))

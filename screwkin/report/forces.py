@@ -1,4 +1,4 @@
-"""Pictures of forces: what the feet bear, where in the soles, and what the joints do."""
+"""Pictures of forces: forces of the feet, where in the soles, and what the joints do."""
 
 from __future__ import annotations
 

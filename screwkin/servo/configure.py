@@ -61,7 +61,7 @@ class SavedServo:
 def saved(bus: Bus, bounds: Bounds, k: int) -> SavedServo:
     """What the registers of the servo of joint k hold that ``configure`` could change.
 
-    A servo that answers no readings is first told to: it has no other way to say what it holds.
+    A servo that answers no readings is first set to answer: it has no other way to say what it holds.
 
     Raises:
         BusError: it does not answer. LineLostError: the port is gone.

@@ -160,7 +160,7 @@ def test_wrong_shapes_and_words_are_refused(bioloid, mechanism):
         sk.secondary_rates(mechanism, home, np.zeros(23))
     with pytest.raises(InputError, match="on_singular is 'ignore'; valid: raise, status"):
         sk.secondary_rates(mechanism, home, np.zeros(24), on_singular="ignore")
-    with pytest.raises(InputError, match=r"tip_twists lacks left_foot, but left_foot\.px"):
+    with pytest.raises(InputError, match=r"tip_twists has no left_foot, but left_foot\.px"):
         sk.virtual_motion(mechanism, home, np.zeros(6), {"right_foot": np.zeros(6)})
     _, tips = motion()
     with pytest.raises(

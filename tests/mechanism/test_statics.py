@@ -229,7 +229,7 @@ def test_what_cannot_be_answered_is_refused_with_the_reason(call, error, message
 def test_a_robot_in_the_air_is_refused():
     robot = load_robot("bioloid")
     with pytest.raises(
-        InputError, match=r"floating base and nothing bears it; name tips on the floor .* right_foot"
+        InputError, match=r"floating base and nothing supports it; name tips on the floor .* right_foot"
     ):
         sk.static_forces(sk.closed_mechanism(robot), sk.home(robot), weights=True, contacts=[])
 
