@@ -66,3 +66,51 @@ def _matrix(pose: object) -> Array:
     from screwkin.algebra.se3 import as_array
 
     return as_array(pose).astype(float)
+
+
+LEAVES = (("shin", 15.0, 0.005), ("achilles", 1e4, 2.0))
+"""Cassie's two leaf springs on legs of 1.9 kg: stiffness and damping of each, N m/rad and N/m."""
+
+GAIT_OF_LEAVES = {"lift": 0.015, "stride": 0.1, "waist_height": 0.165}
+"""What the default gait is changed to for ``linkages/tarsus-legs``, with leaves or without."""
+
+
+@cache
+def leaf_legs() -> Robot:
+    """``linkages/tarsus-legs`` with a leaf amid each shin, and one along each achilles rod."""
+    text = find_robot("linkages/tarsus-legs").read_text(encoding="utf-8")
+    row = """[[link]]
+name = "right_{name}_end"
+mass = {mass}
+com = {com}
+inertia = {{ box = [0.01, 0.01, "shin/2"] }}
+
+[[joint]]
+name = "right_{name}_leaf"
+parent = "right_{name}"
+child = "right_{name}_end"
+type = "{type}"
+s = {s}
+s0 = {s0}
+passive = true
+stiffness = {k}
+damping = {d}
+
+[[joint]]
+name = "right_heel\""""
+    shin = {"mass": 0.02, "com": '[0, "-hip_y", "-thigh - shin"]', "type": "revolute", "s": [0, 1, 0]}
+    rod = {"mass": 0.004, "com": '["heel_x", "-hip_y", "-thigh - shin + heel_z"]', "type": "prismatic"}
+    for (name, k, d), what, place in (
+        (LEAVES[0], shin, '[0, "-hip_y", "-thigh - shin/2"]'),
+        (LEAVES[1], {**rod, "s": [0, 0, 1]}, '["heel_x", "-hip_y", "-thigh"]'),
+    ):
+        new = row.format(name=name, k=k, d=d, s0=place, **what)
+        text = text.replace('[[joint]]\nname = "right_heel"', new, 1)
+    text = text.replace(
+        'parent = "right_shin"\nchild = "right_tarsus"', 'parent = "right_shin_end"\nchild = "right_tarsus"'
+    )
+    text = text.replace(
+        'parent = "right_achilles"\nchild = "right_heel_eye"',
+        'parent = "right_achilles_end_link"\nchild = "right_heel_eye"',
+    )
+    return parse_robot(text.replace("right_achilles_end_link", "right_achilles_end"))

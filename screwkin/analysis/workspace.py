@@ -25,6 +25,7 @@ from screwkin.ik.reach import OUT_OF_REACH, REACHABLE, cause_names, reach
 from screwkin.ik.tied import refuse_tied
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.model.robot import Robot
+from screwkin.model.sprung import refuse_sprung
 
 Progress = Callable[[float], None]
 
@@ -111,6 +112,7 @@ def workspace(
         InputError: the limb has too few joints, heights or resolution make no grid.
         UnknownNameError: no such limb.
     """
+    refuse_sprung(robot, "workspace")
     refuse_tied(robot, robot.limb(limb).name, "workspace")
     chain = SerialChain.of(robot, limb)
     if len(chain.joints) < 6:

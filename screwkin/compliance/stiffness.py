@@ -122,7 +122,7 @@ def static_deflection(
             both feet, where the state has them.
         stiffness: of the joints [N m/rad or N/m]: one number, or by name with ``default``, an array (...)
             where it changes along the batch; default: the table's. Joints without a motor are free unless
-            they are named.
+            they are named, or have a spring of their own in the table.
         method: ``linear`` takes the forces at the commanded posture; ``nonlinear`` solves for the posture
             where all forces are in balance, by Newton's method from the commanded one.
         gravity: [m/s^2], along -z of the world.
@@ -213,11 +213,12 @@ def loaded_robot(
     model = elastic(robot)
     n, added = len(robot.joints), 6 * len(model.bending)
     at_rest = {name: _at_frame(robot, State(T, q), name, _flat_rows(x, batch)) for name, x in bodily.items()}
-    pushed = None
-    if efforts:
-        pushed = np.zeros((len(q), n + added))
+    own, relaxed = _own_springs(robot, q, {*laws, *(stiffness if isinstance(stiffness, Mapping) else ())})
+    k, pushed = k + own, None
+    if efforts or relaxed.any():
+        pushed = np.pad(relaxed, [(0, 0), (0, added)])
         for name, effort in efforts.items():
-            pushed[:, robot.joint_names.index(name)] = np.broadcast_to(effort, batch).reshape(-1)
+            pushed[:, robot.joint_names.index(name)] += np.broadcast_to(effort, batch).reshape(-1)
     loaded = Loaded(
         model.robot,
         supports[0],
@@ -232,6 +233,17 @@ def loaded_robot(
         (*((name, None) for name in supports[1:]), *model.loops),
     )
     return loaded, supports, batch
+
+
+def _own_springs(robot: Robot, q: Array, others: set[int | str]) -> tuple[Array, Array]:
+    """Stiffness (n,) of springs that the table gives to passive joints; their efforts (B, n) as commanded.
+
+    A joint that is asked about by its name, or by its index as one with a law, has no other spring.
+    """
+    k = np.array(
+        [0.0 if {i, one.name} & others else one.stiffness for i, one in enumerate(robot.joints)], dtype=float
+    )
+    return k, k * (np.array([joint.rest for joint in robot.joints]) - q)
 
 
 def _at_frame(robot: Robot, state: State, name: str, load: Array) -> Array:

@@ -15,6 +15,7 @@ from screwkin.algebra.linear import cramer
 from screwkin.algebra.scalar import Scalar, plus, times, where
 from screwkin.algebra.screws import Wrench, wrench_at
 from screwkin.algebra.se3 import NO_TWIST, ZERO, Pose, Twist, Vector, cross, leaves
+from screwkin.dynamics.joint_springs import beside_springs
 from screwkin.dynamics.loops import Admitted, actuated_joints, refuse_loops
 from screwkin.dynamics.newton_euler import (
     NO_WRENCH,
@@ -198,6 +199,7 @@ def contact_distribution(
     for carrier, wrench in zip(carriers, wrenches, strict=True):
         needed[carrier.link] = needed[carrier.link] - wrench_at(-carrier.tip, wrench)
     _, efforts = carried(bodies, needed)
+    efforts = beside_springs(robot, efforts, q, qd)
     if loops:
         efforts = loops.efforts(loops.generalised(efforts), motors)
     rows = [leaves(wrench) for wrench in wrenches]

@@ -10,6 +10,7 @@ from screwkin.algebra.scalar import Scalar, minus
 from screwkin.algebra.screws import Wrench
 from screwkin.algebra.se3 import NO_TWIST, Pose, Twist, Vector, leaves
 from screwkin.dynamics import newton_euler
+from screwkin.dynamics.joint_springs import with_joint_springs
 from screwkin.dynamics.loops import Admitted, refuse_held, refuse_loops
 from screwkin.dynamics.newton_euler import NO_WRENCH, Bodies
 from screwkin.kinematics.formula import formula, refusing
@@ -36,7 +37,8 @@ def forward_dynamics(
         robot: n joints, with masses; what is fixed to the world has a base that rests.
         state: closed, where the robot has loops of its own.
         qd: joint rates [rad/s or m/s]; of a robot with loops those of the joints that drive are read.
-        efforts: of all joints [N m or N]; those of motors at joints that follow do work too.
+        efforts: of all joints [N m or N]; those of motors at joints that follow do work too. Springs and
+            dampers of passive joints, which the table gives, act beside them.
         base_twist: [omega; v of the base origin], world axes; default: zero.
         base_wrench: [m; f] on a floating base about its origin, world axes [N m, N]; default: zero.
         gravity: [m/s^2], along -z of the world; a number, or one for every sample.
@@ -70,7 +72,7 @@ def forward_dynamics(
         qd, bias = loops.motion(robot, qd, still)
         M = loops.reduced(M)
     needed, own = newton_euler.wrench_and_efforts(bodies, qd, bias, twist, NO_TWIST, gravity)
-    joints = [minus(a, b) for a, b in zip(efforts, own, strict=True)]
+    joints = [minus(a, b) for a, b in zip(with_joint_springs(robot, efforts, q, qd), own, strict=True)]
     if loops:
         joints = loops.generalised(joints)
     if robot.base == "fixed":

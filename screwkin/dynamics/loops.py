@@ -210,7 +210,7 @@ def _sum(twists: Iterable[Twist]) -> Twist:
 
 @kept
 def actuated_joints(robot: Robot, names: tuple[str, ...] | None) -> tuple[int, ...]:
-    """Indices in q of the joints that have motors; by default ``motor_joints``.
+    """Indices in q of the joints that have motors, by default ``motor_joints``; and those on springs.
 
     Raises:
         UnknownNameError: no such joint. InputError: named twice, or too few for the motions.
@@ -221,6 +221,7 @@ def actuated_joints(robot: Robot, names: tuple[str, ...] | None) -> tuple[int, .
         names = motor_joints(robot)
     if names is None:
         return tuple(robot.joint_names.index(name) for name in driving)
+    names = (*names, *(joint.name for joint in robot.joints if joint.stiffness and joint.name not in names))
     chosen = [one_of("joint", name, robot.joint_names) for name in names]
     if len(set(chosen)) < len(chosen):
         raise InputError("actuated names a joint twice; give every joint once")

@@ -7,6 +7,7 @@ from typing import Any
 from screwkin.algebra.screws import Wrench, wrench_at
 from screwkin.algebra.se3 import NO_TWIST, Pose, Twist, Vector
 from screwkin.dynamics import newton_euler
+from screwkin.dynamics.joint_springs import beside_springs
 from screwkin.dynamics.loops import Admitted, actuated_joints, refuse_held, refuse_loops
 from screwkin.dynamics.newton_euler import Bodies
 from screwkin.dynamics.zmp import cart_table_zmp, zmp_from_wrench
@@ -117,7 +118,7 @@ def inverse_dynamics(
 
     Returns:
         (..., 6+n): wrench [m; f] on the base about its origin, world axes [N m, N]; joint efforts [N m or N],
-        0 at joints without motors.
+        0 at joints without motors; at joints with a spring what the motion needs beside spring and damper.
 
     Raises:
         UnknownNameError: an actuated joint is none.
@@ -148,6 +149,7 @@ def inverse_dynamics(
         base_acceleration or NO_TWIST,
         gravity,
     )
+    efforts = beside_springs(robot, efforts, q, qd)
     if loops:
         efforts = loops.efforts(loops.generalised(efforts), motors)
     return (wrench, *efforts)

@@ -30,6 +30,7 @@ from screwkin.kinematics.status import Status
 from screwkin.mechanism.choice import closed_mechanism
 from screwkin.mechanism.mechanism import Mechanism
 from screwkin.model.robot import Robot
+from screwkin.model.sprung import stiffened
 from screwkin.model.state import State
 
 STEPS = 3
@@ -55,6 +56,7 @@ def coarse_walks(robot: Robot, gaits: Sequence[Gait], steps: int = STEPS) -> lis
         gaits: fitted to it.
         steps: at most ``STEPS`` are planned.
     """
+    robot = stiffened(robot)
     whole, drive = stance_of(robot), driven(robot, arms_of(robot))
     mechanism, stance = closed_mechanism(drive.moving), drive.stance(whole)
     offset = _com_at_home(robot)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from screwkin.gait.stance import stance_of
 from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.model.recorded import robot_record
 from screwkin.model.robot import Robot
+from screwkin.model.sprung import sprung_joints, stiffened, with_springs
 from screwkin.trajectory import Trajectory
 
 TRACED = ("numpy", "scipy", "screwkin")
@@ -60,6 +62,8 @@ def walk(robot: Robot, gait: Gait, steps: int | Footsteps | None = None, command
     """
     expect(robot, Robot, "robot", 'load_robot("NAME")')
     expect(gait, Gait, "gait", 'load_gait("NAME")')
+    if sprung_joints(robot):
+        return sprung_walk(robot, walk(stiffened(robot), gait, steps, command))
     if isinstance(steps, Footsteps):
         gait, steps = with_footsteps(gait, steps), len(steps)
     gait = fitted(gait, robot)
@@ -85,6 +89,8 @@ def planned_walk(robot: Robot, gait: Gait, steps: int, command: str = "") -> Tra
         UnreachableError, SingularError, LimitError: names limb, sample and time.
         GaitError, InputError: the gait does not fit the robot.
     """
+    if sprung_joints(robot):
+        return sprung_walk(robot, planned_walk(stiffened(robot), gait, steps, command))
     return followed_trajectory(robot, follow(robot, gait, steps), steps, command)
 
 
@@ -133,6 +139,18 @@ def followed_trajectory(robot: Robot, done: Followed, steps: int, command: str =
             "versions": versions(*TRACED),
             "command": command,
         },
+    )
+
+
+def sprung_walk(robot: Robot, walked: Trajectory) -> Trajectory:
+    """A walk of ``stiffened(robot)`` as one of the robot, whose sprung joints are planned to rest."""
+    return replace(
+        walked,
+        joint_names=robot.joint_names,
+        q=with_springs(robot, walked.q),
+        qd=with_springs(robot, walked.qd),
+        qdd=with_springs(robot, walked.qdd),
+        meta={**walked.meta, "robot": robot_record(robot)},
     )
 
 

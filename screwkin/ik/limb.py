@@ -22,6 +22,7 @@ from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.holds import joined_tips
 from screwkin.mechanism.linkages import limb_linkages
 from screwkin.model.robot import Robot, refuse_closures
+from screwkin.model.sprung import refuse_sprung
 
 DEFAULT = IkSettings()
 
@@ -86,6 +87,7 @@ def limb_ik(
         ((8, 6), True)
     """
     one_of("method", method, get_args(Method))
+    refuse_sprung(robot, "limb_ik")
     chain = limb_chain(robot, limb)
     _refuse_joined(robot, chain.limb)
     settings, start = settings or DEFAULT, resting(robot, chain) if guess is None else guess

@@ -21,6 +21,7 @@ from screwkin.ik.whole_body import PRECISE, Method, axes_of, solve_whole_body
 from screwkin.kinematics.arrays import checked, exact_target, of_shape, one_batch
 from screwkin.mechanism.holds import on_floor
 from screwkin.model.robot import Robot, refuse_closures
+from screwkin.model.sprung import refuse_sprung
 from screwkin.model.state import State, home
 
 
@@ -82,6 +83,7 @@ def solve_pose(
             raise UnknownNameError("target", name, ("base", *robot.tip_names))
         shape = (4, 4) if np.shape(value)[-2:] == (4, 4) or name == "base" else (3,)
         wanted[name] = of_shape(labels[name], value, *shape)
+    refuse_sprung(robot, "solve_pose")
     if len(wanted) < 2 and not on_floor(robot):
         raise InputError("no targets; name at least one tip, such as " + ", ".join(robot.tip_names[:2]))
     q = checked("guess.q", guess.q, len(robot.joints))

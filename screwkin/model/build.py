@@ -142,6 +142,9 @@ def _joint(row: JointRow) -> Joint:
         row.velocity,
         row.effort,
         passive=row.passive,
+        stiffness=row.stiffness,
+        rest=row.rest,
+        damping=row.damping,
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from screwkin.algebra.se3 import leaves
 from screwkin.errors import Fault
 from screwkin.model.link_spring import MATERIAL, stiffness_faults
-from screwkin.model.records import ShapeKind, Sole
+from screwkin.model.records import Joint, ShapeKind, Sole
 from screwkin.model.rows import Rows
 from screwkin.model.schema import InertiaRow, JointRow, LinkRow, ShapeRow, SoleRow, SpringRow
 
@@ -97,6 +97,26 @@ def _joint(joint: JointRow) -> Iterator[tuple[str, str, str]]:
         yield "mimic.ratio", f"is {joint.mimic.ratio:g}", "Write a finite number"
     if joint.mimic is not None and not math.isfinite(joint.mimic.offset):
         yield "mimic.offset", f"is {joint.mimic.offset:g}", "Write a finite number"
+    yield from spring_faults(joint, joint.mimic is not None)
+
+
+def spring_faults(joint: JointRow | Joint, follows: bool) -> Iterator[tuple[str, str, str]]:
+    """Key, what is wrong and what is right, for a joint's spring and damper."""
+    for key in ("stiffness", "damping"):
+        value = getattr(joint, key)
+        if not 0 <= value < math.inf:
+            yield key, f"is {value:g}", "Write a finite number of at least 0"
+        elif value and (follows or not joint.passive):
+            what, fix = (
+                ("follows another one", "Give it to the joint that leads")
+                if follows
+                else ("has a motor", "Write passive = true; a motor's own stands under [servos]")
+            )
+            yield key, f"is {value:g} at a joint that {what}", fix
+    if not math.isfinite(joint.rest):
+        yield "rest", f"is {joint.rest:g}", "Write a finite number"
+    elif joint.rest and not joint.stiffness:
+        yield "rest", f"is {joint.rest:g} without a spring", "Write its stiffness too, or leave it out"
 
 
 def sole_faults(sole: SoleRow | Sole) -> Iterator[tuple[str, str, str]]:

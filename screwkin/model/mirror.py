@@ -113,6 +113,7 @@ def image(
         new["mimic"] = (following or {}).get(row.name)
         if around:  # 0.0 - x, so that no limit reads -0
             new["lower"], new["upper"] = 0.0 - row.upper, 0.0 - row.lower
+            new["rest"] = 0.0 - row.rest
     elif isinstance(row, InertiaRow):
         new["xy"], new["yz"] = -row.xy, -row.yz
     elif isinstance(row, SpringRow):  # turns about x and z and shifts along y change their signs

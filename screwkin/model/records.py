@@ -115,7 +115,9 @@ class Joint:
     """A screw joint between two links, with limits in rad (m for prismatic), rad/s and N m.
 
     ``passive``: the table says that no motor turns it (which joints of a loop have motors where no table says
-    so: ``mechanism.actuation``).
+    so: ``mechanism.actuation``). Such a joint may have a spring and a damper, as a leaf or a heel has:
+    ``stiffness`` [N m/rad or N/m], ``rest``, where the spring is relaxed [rad or m], and ``damping``
+    [N m s/rad or N s/m].
     """
 
     name: str
@@ -128,6 +130,14 @@ class Joint:
     velocity: float
     effort: float
     passive: bool = field(default=False, kw_only=True)
+    stiffness: float = field(default=0.0, kw_only=True)
+    rest: float = field(default=0.0, kw_only=True)
+    damping: float = field(default=0.0, kw_only=True)
+
+    @property
+    def springs(self) -> bool:
+        """Whether a spring or a damper acts on it."""
+        return self.stiffness > 0 or self.damping > 0
 
 
 @dataclass(frozen=True)

@@ -146,6 +146,9 @@ class JointRow(Row):
     velocity: Positive = Field(math.inf, description="greatest speed in rad/s or m/s")
     effort: Positive = Field(math.inf, description="greatest torque or force in N m or N")
     passive: bool = Field(False, description="true for a joint without a motor")
+    stiffness: Value = Field(0.0, description="of a passive joint's spring in N m/rad or N/m")
+    rest: Value = Field(0.0, description="position in rad or m at which its spring is relaxed")
+    damping: Value = Field(0.0, description="of a passive joint's damper in N m s/rad or N s/m")
     mimic: MimicRow | None = Field(None, description='{ joint = "leader", ratio = 1.0, offset = 0.0 }')
 
 

@@ -12,10 +12,19 @@ from typing import Any, get_args
 import numpy as np
 
 from screwkin.algebra.se3 import Pose, Vector
-from screwkin.model.checks import sole_faults
+from screwkin.model.checks import sole_faults, spring_faults
 from screwkin.model.coupled import tightened
 from screwkin.model.link_spring import stiffness_faults
-from screwkin.model.records import FLOOR, Inertia, Joint, LinkSpring, RobotRecord, Shape, ShapeRole
+from screwkin.model.records import (
+    FLOOR,
+    CoupledJoint,
+    Inertia,
+    Joint,
+    LinkSpring,
+    RobotRecord,
+    Shape,
+    ShapeRole,
+)
 from screwkin.model.structure import RESERVED
 from screwkin.model.values import COUPLINGS, NAME, UNIT_TOLERANCE
 
@@ -171,4 +180,6 @@ def _is_joint(joint: Joint) -> bool:
     }[joint.type]
     ordered = joint.lower <= joint.upper and joint.lower < math.inf and joint.upper > -math.inf
     bounded = joint.velocity > 0 and joint.effort > 0 and isinstance(joint.passive, bool)
-    return bool(fits and ordered and bounded)
+    sprung = joint.stiffness or joint.damping or joint.rest
+    relaxed = not sprung or not any(True for _ in spring_faults(joint, isinstance(joint, CoupledJoint)))
+    return bool(fits and ordered and bounded and relaxed)

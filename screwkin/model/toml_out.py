@@ -159,6 +159,7 @@ def _joint(joint: Joint) -> dict[str, Any]:
     row |= {key: x for key, x in limits.items() if x != _UNLIMITED[key]}
     if joint.passive:
         row["passive"] = True
+    row |= {key: x for key in ("stiffness", "rest", "damping") if (x := getattr(joint, key))}
     if isinstance(joint, CoupledJoint):
         row["mimic"] = coupling_of(joint)
     return row

@@ -33,6 +33,7 @@ from screwkin.sim.drive import UNLIMITED, RigidServos, Servos, motored
 from screwkin.sim.floor import contact_spring, floor_in_mujoco
 from screwkin.sim.loops import close_in_mujoco
 from screwkin.sim.perturbation import NONE, Perturbation, noted
+from screwkin.sim.table_springs import check_spring_steps
 
 CORNER = 1e-4
 """Radius [m] of the spheres that stand for the corners of a sole that no box has."""
@@ -96,6 +97,7 @@ class MuJoCoBackend:
         self._robot = robot
         self._physics = physics or MuJoCoPhysics()
         self.dt = self._physics.dt
+        check_spring_steps(robot, self.dt)
         self._servos = servos or RigidServos(robot)
         self.servo = self._servos.name
         self._motored = motored(robot)
@@ -309,6 +311,9 @@ def _add_joint(mj: Any, element: Any, body: SimBody, joint: Joint, rotor: float)
         limited=bool(np.isfinite([joint.lower, joint.upper]).any()),
         range=limits,
         armature=rotor,
+        stiffness=joint.stiffness,
+        springref=joint.rest,
+        damping=joint.damping,
         solimp_friction=STIFF["solimp"],
     )
 

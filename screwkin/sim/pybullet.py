@@ -37,6 +37,7 @@ from screwkin.sim.pybullet_feet import Feet
 from screwkin.sim.pybullet_look import Look, pose_of
 from screwkin.sim.quiet import quiet
 from screwkin.sim.rotors import RelativeRotors, with_rotors
+from screwkin.sim.table_springs import TableSprings, check_spring_steps
 
 Solver = Literal["direct", "iterative"]
 FrictionModel = Literal["pyramid", "cone"]
@@ -103,6 +104,8 @@ class PyBulletBackend:
         self._servos = servos or RigidServos(robot)
         self.servo = self._servos.name
         self._physics = physics or Physics()
+        check_spring_steps(robot, self._physics.dt)
+        self._springs = TableSprings.of(robot)
         _check_soles(self._physics)
         if robot.coupled or robot.closures or self._physics.sole_stiffness is not None:
             self._physics = replace(self._physics, solver="iterative")
@@ -258,7 +261,8 @@ class PyBulletBackend:
             **here,
         )
         self._applied = action.torque
-        torque = np.concatenate([action.torque, np.zeros(len(self._tree) - count)])
+        every = action.torque + self._springs.efforts(q, qd)
+        torque = np.concatenate([every, np.zeros(len(self._tree) - count)])
         if command.force is not None:
             at, _ = p.getBasePositionAndOrientation(self._body, **here)
             p.applyExternalForce(self._body, -1, list(command.force), at, p.WORLD_FRAME, **here)

@@ -91,7 +91,7 @@ def deviations(robot: Robot, seed: int) -> dict[str, float]:
         ``closed``: rates at which the loops' ends part; ``bent``: their accelerations, against differences;
         ``newton``: the efforts along all that the loops leave free, against recursive Newton-Euler;
         ``pinocchio``: accelerations by its constraint dynamics; ``parting`` and ``mujoco``: as ``closed`` and
-        ``newton``, by MuJoCo's equality constraints, mass matrix and bias.
+        ``newton``, by MuJoCo's equality constraints, mass matrix, bias and springs.
     """
     motion, driving = random_motion(robot, seed), _driving(robot)
     wanted, found = np.r_[motion.rate, motion.qdd[driving]], motion.found
@@ -160,7 +160,10 @@ def in_mujoco(robot: Robot, motion: Motion) -> dict[str, float]:
     J = data.efc_J.reshape(-1, model.nv)[: data.ne]
     needed = np.zeros(model.nv)
     mujoco.mj_mulM(model, data, needed, a)
-    return {"parting": _apart(J @ v, 0.0, v), "mujoco": _apart_freely(J, needed + data.qfrc_bias, tau)}
+    return {
+        "parting": _apart(J @ v, 0.0, v),
+        "mujoco": _apart_freely(J, needed + data.qfrc_bias - data.qfrc_passive, tau),
+    }
 
 
 def _apart_freely(J: Any, needed: Any, efforts: Any) -> float:

@@ -38,7 +38,15 @@ def welded(robot: Robot, R_world_base: Any) -> tuple[Any, Any, Any]:
         for slide in slides:
             kind = mj.mjtJoint.mjJNT_SLIDE if slide else mj.mjtJoint.mjJNT_HINGE
             name = joint.name if slide is slides[0] else f"{joint.name} advance"
-            body.add_joint(name=name, type=kind, axis=[float(x) for x in joint.screw.s])
+            first = slide is slides[0]
+            body.add_joint(
+                name=name,
+                type=kind,
+                axis=[float(x) for x in joint.screw.s],
+                stiffness=joint.stiffness * first,
+                springref=joint.rest * first,
+                damping=joint.damping * first,
+            )
         if joint.type == "helical":
             tie = spec.add_equality(
                 type=mj.mjtEq.mjEQ_JOINT,
