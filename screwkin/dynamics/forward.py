@@ -10,7 +10,7 @@ from screwkin.algebra.scalar import Scalar, minus
 from screwkin.algebra.screws import Wrench
 from screwkin.algebra.se3 import NO_TWIST, Pose, Twist, Vector, leaves
 from screwkin.dynamics import newton_euler
-from screwkin.dynamics.joint_springs import with_joint_springs
+from screwkin.dynamics.joint_springs import refuse_bending, with_joint_springs
 from screwkin.dynamics.loops import Admitted, refuse_held, refuse_loops
 from screwkin.dynamics.newton_euler import NO_WRENCH, Bodies
 from screwkin.kinematics.formula import formula, refusing
@@ -48,7 +48,7 @@ def forward_dynamics(
         [rad/s^2 or m/s^2], those that follow included.
 
     Raises:
-        InputError: a loop is open, or closures hold the robot on the floor.
+        InputError: a loop is open, closures hold the robot on the floor, or links bend.
         SingularError: the joints that drive do not determine those that follow, at the state.
         ShapeError: a wrong shape, NaN or infinity, or a base pose that is not rigid.
 
@@ -63,6 +63,7 @@ def forward_dynamics(
     Source: Featherstone (2008), section 6.5; loops: virtual power on the motions that Davies' N admits.
     """
     refuse_held(robot, "forward_dynamics")
+    refuse_bending(robot, "forward_dynamics")
     twist = base_twist or NO_TWIST
     bodies = Bodies.of(robot, T_world_base.R, q)
     M, still = newton_euler.composite_mass_matrix(bodies), [0] * len(robot.joints)

@@ -5,7 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from screwkin.algebra.scalar import Scalar, minus, plus, times
+from screwkin.errors import InputError
 from screwkin.model.robot import Robot
+
+
+def refuse_bending(robot: Robot, what: str) -> None:
+    """Refuse a robot whose links bend where they would be taken as rigid without a word.
+
+    Raises:
+        InputError: names the links.
+    """
+    if bending := [link.name for link in robot.links if link.spring]:
+        raise InputError(
+            f"{robot.name} has links that bend ({', '.join(bending)}), and {what} takes links as rigid; give a "
+            "passive joint in them a stiffness, or leave out their spring; static_deflection bends them"
+        )
 
 
 def spring_efforts(robot: Robot, q: Sequence[Scalar], qd: Sequence[Scalar]) -> list[Scalar]:

@@ -153,3 +153,15 @@ def test_what_moves_freely_is_refused() -> None:
         sk.elastic_commands(
             arm(free=True), at(0.1, 0.2), "base", ["hand"], {"elbow": 5.0}, gravity=0, loads={"elbow": 0.1}
         )
+
+
+def test_a_loaded_crank_is_commanded_by_what_davies_method_says_it_bears() -> None:
+    """10 mN m on the rocker of a four-bar: 2.4088 mN m at the crank, undone by so much over its stiffness."""
+    robot = sk.load_robot("linkages/four-bar")
+    home, load = sk.home(robot), {"rocker": 0.01}
+    told = sk.elastic_commands(robot, home, "base", ["rocker"], 50.0, 0.0, loads=load)
+    bent = sk.static_deflection(robot, told.state, "base", 50.0, gravity=0, loads=load)
+    np.testing.assert_allclose(bent.state.q, home.q, rtol=0, atol=1e-12)
+    crank = robot.joint_names.index("crank")
+    forces = sk.static_forces(sk.closed_mechanism(robot), home, load)
+    assert told.state.q[crank] - home.q[crank] == pytest.approx(float(forces["crank"]) / 50, rel=1e-9)

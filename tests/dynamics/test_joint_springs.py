@@ -200,3 +200,12 @@ def test_a_table_of_springs_is_written_and_read_and_its_mirror_image_rests_oppos
     legs = leaf_legs()
     named = dict(zip(legs.joint_names, legs.joints, strict=True))
     assert named["left_shin_leaf"].stiffness == named["right_shin_leaf"].stiffness > 0
+
+
+def test_links_that_bend_are_refused_where_motion_would_take_them_as_rigid() -> None:
+    from tests.compliance.test_links import AT_REST, beam
+
+    with pytest.raises(
+        InputError, match=r"links that bend \(bar\), and forward_dynamics takes links as rigid"
+    ):
+        sk.forward_dynamics(beam(), AT_REST, np.zeros(1), np.zeros(1))
