@@ -17,8 +17,8 @@ def refuse_bending(robot: Robot, what: str) -> None:
     """
     if bending := [link.name for link in robot.links if link.spring]:
         raise InputError(
-            f"{robot.name} has links that bend ({', '.join(bending)}), and {what} takes links as rigid; give a "
-            "passive joint in them a stiffness, or leave out their spring; static_deflection bends them"
+            f"{robot.name} has links that bend ({', '.join(bending)}), and {what} takes links as rigid; give "
+            "a passive joint in them a stiffness, or leave out their spring; static_deflection bends them"
         )
 
 
