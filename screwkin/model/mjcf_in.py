@@ -23,6 +23,7 @@ from screwkin.errors import Fault, TableError, UnknownNameError, needed_for
 from screwkin.model.mesh_files import find_mesh
 from screwkin.model.mjcf_loops import is_loop, with_loops
 from screwkin.model.mjcf_size import check_size
+from screwkin.model.mjcf_springs import with_model_springs
 from screwkin.model.records import FLOOR, Posture
 from screwkin.model.robot import Robot
 from screwkin.model.toml_out import robot_toml, rpy_of
@@ -91,6 +92,7 @@ def parse_mjcf(text: str, path: str = "<text>", repair: bool = False) -> UrdfRob
         postures=tuple(_postures(model, read, notes)),
         text="",
     )
+    robot = with_model_springs(model, robot, writer.note)
     robot = with_loops(mujoco, model, robot, writer.place_in(read.robot), writer.note)
     own = tuple(f"{note}: {', '.join(names)}" for note, names in notes.items())
     return UrdfRobot(Robot.from_text(robot_toml(robot), path), (*own, *read.remarks))

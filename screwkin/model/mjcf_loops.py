@@ -11,6 +11,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.screws import Screw
 from screwkin.algebra.se3 import UNTURNED, ZERO, Pose, Vector, as_array, pose_from_array
+from screwkin.model.mjcf_springs import turned_joints
 from screwkin.model.records import FLOOR, Closure, Inertia, Joint, Link, Posture
 from screwkin.model.robot import Robot
 
@@ -142,11 +143,7 @@ def _ball(name: str, link: str, point: Vector) -> list[Joint]:
 
 def _driven(model: Any, joints: Sequence[Joint]) -> list[Joint]:
     """The joints, passive where the model's actuators turn others only."""
-    turned = {
-        model.joint(int(model.actuator_trnid[a][0])).name
-        for a in range(model.nu)
-        if model.actuator_trntype[a] == 0
-    }
+    turned = turned_joints(model)
     return [replace(joint, passive=bool(turned) and joint.name not in turned) for joint in joints]
 
 

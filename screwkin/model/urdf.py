@@ -119,6 +119,9 @@ def urdf_from_robot(robot: Robot, folder: Path | None = None) -> str:
     Raises:
         InputError: the robot has helical joints or closures, which URDF cannot say; all are named.
     """
+    if sprung := [joint.name for joint in robot.joints if joint.springs]:
+        text = f"{robot.name}: URDF has no springs of joints; those of {', '.join(sprung)} are left out"
+        warnings.warn(text, RobotRemark, stacklevel=2)
     return _document(robot, robot.links, tip_and_sole_frames(robot), folder)
 
 
