@@ -87,8 +87,8 @@ def _solved(laws: Mapping[str, Any], efforts: Mapping[str, Array]) -> list[Array
     ends = np.cumsum([size * len(group) for group in alike.values()])
 
     def residual(x: Array, at: Array) -> tuple[Array, Array]:
-        cuts = [0, *np.searchsorted(at, ends).tolist()]
-        here = [spring_effort(law, x[a:b, 0]) for law, a, b in zip(chosen, cuts, cuts[1:], strict=False)]
+        cuts, column = [0, *np.searchsorted(at, ends).tolist()], x[:, 0]
+        here = [spring_effort(law, column[a:b]) for law, a, b in zip(chosen, cuts, cuts[1:], strict=False)]
         effort, slope = (np.concatenate(parts)[:, None] for parts in zip(*here, strict=True))
         return (flat[at] - effort) / np.where(slope > 0, slope, np.nan), np.ones((len(at), 1, 1))
 
