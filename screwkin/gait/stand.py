@@ -17,9 +17,10 @@ from screwkin.gait.plan import Plan, check_fitted, plan_around
 from screwkin.gait.record import Gait
 from screwkin.gait.splines import minimum_jerk
 from screwkin.gait.stance import Stance
-from screwkin.gait.walk import followed_trajectory
+from screwkin.gait.walk import followed_trajectory, sprung_walk
 from screwkin.mechanism.mechanism import Mechanism
 from screwkin.model.robot import Robot
+from screwkin.model.sprung import sprung_joints, stiffened
 from screwkin.trajectory import Trajectory
 
 Place = tuple[float, float, float, float]
@@ -57,6 +58,8 @@ def stand(robot: Robot, gait: Gait, *places: Place, command: str = "") -> Trajec
     """
     expect(robot, Robot, "robot", 'load_robot("NAME")')
     expect(gait, Gait, "gait", 'load_gait("NAME")')
+    if sprung_joints(robot):
+        return sprung_walk(robot, stand(stiffened(robot), gait, *places, command=command))
     gait = fitted(gait, robot)
     check_fitted(gait)
     ways = _checked_places(places)

@@ -165,6 +165,10 @@ def test_leaf_legs_walk_as_rigid_ones_and_what_would_move_leaves_refuses() -> No
     for k, tip in enumerate(robot.tip_names):
         np.testing.assert_allclose(poses[:, k], walked.T_world_tip[tip], rtol=0, atol=1e-9)
     assert walked.meta["robot"]["table"] == robot.text
+    gait = sk.load_gait("preview").replace(waist_height=GAIT_OF_LEAVES["waist_height"], rate=10.0)
+    squat = sk.stand(robot, gait, (0, 0, -0.005, 1.0))
+    assert squat.q.shape[1] == len(robot.joints)
+    assert not squat.q[:, list(sprung_joints(robot))].any()
     foot = sk.frame_pose(robot, sk.home(robot), "right_foot")
     for ask in (
         lambda: sk.limb_ik(robot, "right_leg", foot),
