@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
 import screwkin as sk
-from screwkin.errors import LimitError
+from screwkin.errors import LimitError, SingularError
+from screwkin.gait.lengths import fitted
+from screwkin.gait.walk import planned_walk
+from tests.linked import flat_at_90
 
 LIMIT = np.deg2rad(60)
 
@@ -26,3 +31,18 @@ def test_a_motor_of_60_degrees_is_honoured_by_walks() -> None:
     walk = sk.walk(robot, low, 2)
     assert 0.7 * LIMIT < np.abs(walk.q[:, motors]).max() < LIMIT
     np.testing.assert_array_equal(walk.q, sk.walk(free, low, 2).q)
+
+
+def test_a_walk_says_how_near_a_linkage_comes_to_its_dead_point_and_is_refused_there() -> None:
+    """Bars that lie flat at a knee of 90 degrees: the nearest knee of the walk is what the note says."""
+    robot = flat_at_90()
+    low = sk.load_gait("walk").replace(lift=0.012, rate=10.0)
+    walk = sk.walk(robot, low, 2)
+    notes = [note for note in walk.meta["notes"] if "dead point" in note]
+    assert len(notes) == 2  # one for each knee
+    knees = walk.q[:, [robot.joint_names.index(f"{s}_knee") for s in ("right", "left")]]
+    left = min(float(re.findall(r"within (\d\.\d) deg of its dead point", note)[0]) for note in notes)
+    assert 2 < left < 10
+    assert left == pytest.approx(90 - np.degrees(knees.max()), abs=1.0)
+    with pytest.raises(SingularError, match=r"right_leg, sample \d+ .* reaches its dead point"):
+        planned_walk(robot, fitted(low.replace(lift=0.03), robot), 1)  # ``walk`` without its remedies
