@@ -157,8 +157,8 @@ def test_planning_takes_leaves_as_rigid_and_their_links_as_one() -> None:
 
 def test_leaf_legs_walk_as_rigid_ones_and_what_would_move_leaves_refuses() -> None:
     robot = leaf_legs()
-    walked = sk.walk(robot, sk.load_gait("walk").replace(**GAIT_OF_LEAVES), 1)
-    rigid = sk.walk(stiffened(robot), sk.load_gait("walk").replace(**GAIT_OF_LEAVES), 1)
+    plan = sk.load_gait("walk").replace(rate=10.0, **GAIT_OF_LEAVES)
+    walked, rigid = (sk.walk(one, plan, 1) for one in (robot, stiffened(robot)))
     np.testing.assert_array_equal(walked.zmp, rigid.zmp)
     np.testing.assert_array_equal(walked.q[:, list(sprung_joints(robot))], 0.0)
     poses = sk.tip_poses(robot, sk.State(walked.T_world_base, walked.q))
