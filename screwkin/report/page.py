@@ -147,7 +147,8 @@ def _pictures(pictures: Sequence[Saved]) -> str:
 
 def figure_html(path: Path, name: str, caption: str) -> str:
     """A picture embedded in a page, with its name for those who do not see it; both are HTML."""
-    return f'<figure><img alt="{name}" src="{_embedded(path)}"><figcaption>{caption}</figcaption></figure>'
+    picture = f'<div class="wide"><img alt="{name}" src="{_embedded(path)}"></div>'
+    return f"<figure>{picture}<figcaption>{caption}</figcaption></figure>"
 
 
 def _embedded(path: Path) -> str:

@@ -168,7 +168,7 @@
       const c = canvas.getContext("2d");
       c.scale(ratio, ratio);
       c.font = "11px system-ui, sans-serif";
-      const X = (t) => 38 + (t / end()) * (w - 46), Y = (v) => h - 18 - ((v - low) / (high - low || 1)) * (h - 40);
+      const X = (t) => 38 + (t / end()) * (w - 46), Y = (v) => h - 18 - ((v - low) / (high - low || 1)) * (h - 44);
       c.strokeStyle = css("--line");
       c.fillStyle = css("--soft");
       for (const v of [low, (low + high) / 2, high]) {
@@ -177,12 +177,14 @@
       }
       c.textAlign = "center";
       for (let t = 0; t <= end(); t += Math.max(1, Math.ceil(end() / 8))) c.fillText(`${t} s`, Math.min(X(t), w - 16), h - 4);
-      let at = 38;
+      let at = 38, line = 10;
       c.textAlign = "left";
       for (const row of rows) {
         c.strokeStyle = c.fillStyle = row.colour;
-        c.fillText(row.name, at, 12);
-        at += c.measureText(row.name).width + 14;
+        const width = c.measureText(row.name).width;
+        if (at + width > w) { at = 38; line += 11; }
+        c.fillText(row.name, at, line);
+        at += width + 14;
         c.beginPath();
         row.values.forEach((v, k) => { if (Number.isFinite(v)) c.lineTo(X(times[k]), Y(v)); });
         c.stroke();

@@ -8,7 +8,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.sim.solids import robot_size
-from screwkin.viewer.guides import LitCircuit, link_node, put_axes, put_frames
+from screwkin.viewer.guides import NO_CIRCUIT, LitCircuit, link_node, put_axes, put_frames
 from screwkin.viewer.nodes import Moved, put_mesh
 from screwkin.viewer.playing import Played
 from screwkin.viewer.scene import pieces_of
@@ -18,6 +18,8 @@ from screwkin.viewer.strokes import Triangles, ribbons
 FLOOR, TILE = 2.5, 0.5
 """How far the lines of the floor reach about the robot, and how far they lie apart, in sizes of the robot."""
 LINES = (205, 208, 212)
+GLASS = 0.3
+"""Opacity of bodies in which axes, frames or a circuit are to be seen."""
 
 
 class Stage:
@@ -80,10 +82,18 @@ class Stage:
             handle.visible = visible
         if self._played is not None:
             self._played.mark()
+        self._look_inside()
 
     def circuit(self, name: str) -> None:
         """Light up a circuit of the closed mechanism by its name, or none."""
         self._circuit.name = name
+        self._look_inside()
+
+    def _look_inside(self) -> None:
+        """Bodies are of glass where something within them is to be seen."""
+        inside = self._marked["axes"] or self._marked["frames"] or self._circuit.name != NO_CIRCUIT
+        for handle in self._marks["robot"]:
+            handle.opacity = GLASS if inside else None
 
     def _put_up_motion(self, session: Session) -> None:
         self._track = session.track

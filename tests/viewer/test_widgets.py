@@ -86,7 +86,10 @@ def test_the_scene_follows_the_motion(robot, trajectory):
     stage.show(session)
     lit = [scene.handles[f"/world/circuit/{kind}"] for kind in ("real", "virtual")]
     assert all(len(handle.vertices) for handle in lit)
+    body = scene.handles["/world/robot/torso/body 0"]
+    assert body.opacity < 0.5, "one looks inside"
     stage.circuit("none")
+    assert body.opacity is None
     stage.show(session)
     for handle in lit:
         handle.remove.assert_called_once_with()
