@@ -80,7 +80,7 @@ def _prepare(server: Any, session: Session) -> None:
     server.scene.configure_default_lights(cast_shadow=False)  # shadows cost most where no graphics card is
     server.scene.configure_environment_map(None)
     server.scene.add_light_ambient("/ambient", intensity=1.2)
-    server.initial_camera.position = tuple(middle + size * np.array([0.9, -1.05, 0.45]))
+    server.initial_camera.position = tuple(middle + size * np.array([1.05, -1.22, 0.52]))
     server.initial_camera.look_at = tuple(middle)
 
 
