@@ -146,7 +146,7 @@ def _command_faults(robot: Robot, trajectory: Trajectory, motion: Trajectory) ->
         return
     entry = trajectory.meta["compensation"]
     choices = (entry[key] for key in ("method", "passes", "model"))
-    losses = {name: entry.get(name) for name in ("damping", "armature")}
+    losses = {name: entry.get(name) for name in ("damping", "armature", "friction")}
     anew = compensate_walk(robot, motion, stiffness_of(trajectory), *choices, **losses)
     away = np.abs(anew.q - trajectory.q)
     if not away.max() <= SAME_COMMAND:

@@ -109,9 +109,19 @@ class SimulatedCompliance:
             {name: float(getattr(m, what)) for name, m in zip(robot.joint_names, motors, strict=True)}
             for what in ("stiffness", "damping", "armature")
         )
+        friction = {
+            name: float(m.friction.coulomb) for name, m in zip(robot.joint_names, motors, strict=True)
+        }
         method, model = WAYS["dynamic"]
         return compensate_walk(
-            robot, trajectory, stiffness, method, model=model, damping=damping, armature=armature
+            robot,
+            trajectory,
+            stiffness,
+            method,
+            model=model,
+            damping=damping,
+            armature=armature,
+            friction=friction,
         )
 
 

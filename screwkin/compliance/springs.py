@@ -86,8 +86,9 @@ def drive_losses(
     stiffness: StiffnessChoice = None,
     damping: StiffnessChoice = None,
     armature: StiffnessChoice = None,
-) -> tuple[Array, Array]:
-    """Damping (n,) [N m s/rad] and rotor inertia (n,) [kg m^2] of every joint's servo.
+    friction: StiffnessChoice = None,
+) -> tuple[Array, Array, Array]:
+    """Damping (n,) [N m s/rad], rotor inertia (n,) [kg m^2], dry friction (n,) [N m] of every joint's servo.
 
     They take a share of the torque of servos that move. Each is given as a stiffness is. None stands for the
     figures of the table's servo models where the stiffness is theirs too, else for 0: a spring has none.
@@ -96,16 +97,23 @@ def drive_losses(
         InputError: a joint has none, or one is no finite number of at least 0.
         UnknownNameError: no such joint.
     """
-    if damping is None and armature is None and _of_motors(robot, stiffness):
+    choices = {
+        "damping": (damping, "N m s/rad"),
+        "armature": (armature, "kg m^2"),
+        "friction": (friction, "N m"),
+    }
+    if all(chosen is None for chosen, _ in choices.values()) and _of_motors(robot, stiffness):
         motors = motors_of(robot)
-        return np.array([m.damping for m in motors]), np.array([m.armature for m in motors])
-    d, inertia = (
+        figures = [(m.damping, m.armature, m.friction.coulomb) for m in motors]
+        d, inertia, dry = np.array(figures, dtype=float).reshape(-1, 3).T
+        return d, inertia, dry
+    d, inertia, dry = (
         _by_joint(
             robot, what, 0.0 if chosen is None else chosen, f"a number of at least 0 {unit}", _not_negative
         )
-        for what, chosen, unit in (("damping", damping, "N m s/rad"), ("armature", armature, "kg m^2"))
+        for what, (chosen, unit) in choices.items()
     )
-    return d, inertia
+    return d, inertia, dry
 
 
 def _of_motors(robot: Robot, stiffness: SpringChoice) -> bool:

@@ -57,6 +57,8 @@ WAYS: Mapping[Way, tuple[Method, Model]] = {
     "dynamic": ("joint", "dynamic"),
 }
 """Method and model by name: the foot in the air, all joints by statics, all joints by the walk's torques."""
+CREEP = 0.01
+"""Speed around rest within which the torque for dry friction turns from one sign to the other [rad/s]."""
 
 
 def compensate_walk(
@@ -68,6 +70,7 @@ def compensate_walk(
     model: Model = "nonlinear",
     damping: StiffnessChoice = None,
     armature: StiffnessChoice = None,
+    friction: StiffnessChoice = None,
 ) -> Trajectory:
     """The trajectory with commands that allow for the servos' deflection under the robot's weight.
 
@@ -82,26 +85,28 @@ def compensate_walk(
             for ``joint`` only, takes those of the planned motion, and needs no further pass either.
         damping: what speed takes of the servos' torque, for ``dynamic``; see ``drive_losses``.
         armature: inertia of their rotors, likewise.
+        friction: dry friction of their gears, likewise; it turns with the speed's sign, within ``CREEP``.
 
     Returns:
         Trajectory with the commanded ``q`` and ``qd``; all other fields stay those of the planned motion.
-        ``meta["compensation"]`` holds method, model, passes and stiffness, for ``dynamic`` also damping and
-        armature.
+        ``meta["compensation"]`` holds method, model, passes and stiffness, for ``dynamic`` also damping,
+        armature and friction.
 
     Raises:
         NoSolutionError: the joints are too soft for the robot's weight. UnreachableError, SingularError,
         LimitError: a compensated target or joint is out of reach. InputError: a choice is wrong, or the
         trajectory is not one of this robot's walks.
     """
-    if model != "dynamic" and not (damping is None and armature is None):
-        raise InputError(f"damping and armature are of model 'dynamic', not of {model!r}")
+    if model != "dynamic" and not (damping is None and armature is None and friction is None):
+        raise InputError(f"damping, armature and friction are of model 'dynamic', not of {model!r}")
     k = joint_stiffness(robot, stiffness)
     figures = {"stiffness": k}
     *_, last = _commands(robot, trajectory, stiffness, method, passes, model)
     if model == "dynamic":
-        d, inertia = drive_losses(robot, stiffness, damping, armature)
-        last = last + (d * trajectory.qd + inertia * trajectory.qdd) / k
-        figures |= {"damping": d, "armature": inertia}
+        d, inertia, dry = drive_losses(robot, stiffness, damping, armature, friction)
+        held_back = dry * np.tanh(trajectory.qd / CREEP)
+        last = last + (d * trajectory.qd + inertia * trajectory.qdd + held_back) / k
+        figures |= {"damping": d, "armature": inertia, "friction": dry}
     q = trajectory.q + last
     _check_limits(robot, trajectory, q)
     choices = {

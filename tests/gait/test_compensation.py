@@ -147,6 +147,13 @@ def test_rates_belong_to_the_commands(robot: sk.Robot, walked: sk.Trajectory) ->
 def test_commands_of_motors_add_what_back_emf_and_rotors_take(robot: sk.Robot, walked: sk.Trajectory) -> None:
     spring = compensate_walk(robot, walked, K, model="dynamic")
     motor = compensate_walk(robot, walked, K, model="dynamic", damping={"default": 0.3}, armature=0.005)
+    rubbed = compensate_walk(robot, walked, K, model="dynamic", friction=0.03)
+    dry = K * (rubbed.q - spring.q)
+    quick = np.abs(walked.qd) > 0.2
+    np.testing.assert_allclose(dry[quick], 0.03 * np.sign(walked.qd)[quick], rtol=1e-3)
+    assert np.abs(dry).max() <= 0.03 + 1e-12
+    assert not dry[walked.qd == 0].any()
+    assert motion_faults(robot, rubbed) == ()
     taken = 0.3 * walked.qd + 0.005 * walked.qdd
     np.testing.assert_allclose(K * (motor.q - spring.q), taken, rtol=0, atol=1e-12)
     assert set(motor.meta["compensation"]["damping"].values()) == {0.3}
@@ -154,7 +161,7 @@ def test_commands_of_motors_add_what_back_emf_and_rotors_take(robot: sk.Robot, w
     assert motion_faults(robot, motor) == motion_faults(robot, spring) == ()
     with pytest.raises(InputError, match=r"damping of left_knee is -1\.0; it must be a number of at least 0"):
         compensate_walk(robot, walked, K, model="dynamic", damping={"default": 0.3, "left_knee": -1.0})
-    with pytest.raises(InputError, match="are of model 'dynamic', not of 'linear'"):
+    with pytest.raises(InputError, match="friction are of model 'dynamic', not of 'linear'"):
         compensate_walk(robot, walked, K, model="linear", damping=0.3)
 
 
@@ -167,6 +174,7 @@ def test_a_servo_model_of_the_table_gives_its_motors_figures_unless_a_stiffness_
     )
     assert set(of_table["damping"].values()) == {0.25}
     assert set(of_table["armature"].values()) == {0.005}
+    assert set(of_table["friction"].values()) == {0.03}
     assert set(spring["damping"].values()) == {0.0}
 
 
