@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
-from screwkin.algebra.scalar import Scalar, arc, cos, sin
-from screwkin.algebra.se3 import Pose, Vector
+from screwkin.algebra.arrays import Array
+from screwkin.algebra.scalar import Scalar, arc, cos, sin, where
+from screwkin.algebra.se3 import Pose, Vector, X, Z, as_array, pose_from_array, rotate
 from screwkin.ik.closed import ClosedForm, closed_form
 from screwkin.kinematics.landmarks import waist_frame
 from screwkin.kinematics.mass import mass_center
@@ -19,27 +21,60 @@ from screwkin.model.robot import Robot
 
 @dataclass(frozen=True, eq=False)
 class Leg:
-    """A leg by its closed form, bent in the one way of a branch's number."""
+    """A leg by its closed form, bent in one way, which may go by several numbers of branches.
+
+    Where a sign tells two branches apart, as of hip yaws half a turn from each other, they swap numbers as
+    the leg passes a certain pose; the branch nearest to where the leg was is the one that goes on.
+    """
 
     form: ClosedForm
-    branch: int
+    branches: tuple[int, ...]
 
     @classmethod
     def of(cls, chain: SerialChain, T_base_tip: Pose, q: Sequence[float]) -> Leg:
-        """A leg bent as in a posture q, which has its tip at that pose."""
+        """A leg bent as in a posture q, which has its tip at that pose, and around it."""
         form = closed_form(chain)
         own = np.array([q[i] for i in chain.joints], dtype=float)
-        branches = np.array([branch[:-1] for branch in form.formula(T_base_tip)], dtype=float)
-        return cls(form, int(np.argmin((1.0 - np.cos(branches - own)).sum(axis=1))))
+        around = pose_from_array(as_array(T_base_tip) @ _displacements(T_base_tip))
+        branches = np.array([branch[:-1] for branch in form.formula(around)], dtype=float)  # (B, n, N)
+        nearest = (1.0 - np.cos(branches - own[:, None])).sum(axis=1).argmin(axis=0)
+        return cls(form, tuple(sorted({*nearest.tolist()})))
 
     @property
     def joints(self) -> list[int]:
         """Its joints, by their number in the robot."""
         return list(self.form.chain.joints)
 
-    def positions(self, T_base_tip: Pose) -> Sequence[Scalar]:
-        """Joint positions, within half a turn of zero; out of reach, stretched."""
-        return [arc(sin(x), cos(x)) for x in self.form.formula(T_base_tip)[self.branch][:-1]]
+    def positions(self, T_base_tip: Pose, near: Sequence[Scalar]) -> Sequence[Scalar]:
+        """Joint positions, within half a turn of zero, the nearest to others; out of reach, stretched."""
+        solved = self.form.formula(T_base_tip)
+        first, *others = (list(solved[branch][:-1]) for branch in self.branches)
+        chosen, least = first, _apart(first, near) if others else 0.0
+        for other in others:
+            far = _apart(other, near)
+            chosen = [where(far < least, x, y) for x, y in zip(other, chosen, strict=True)]
+            least = where(far < least, far, least)
+        return [arc(sin(x), cos(x)) for x in chosen]
+
+
+def _apart(q: Sequence[Scalar], near: Sequence[Scalar]) -> Scalar:
+    """How far joint positions are apart, whole turns aside."""
+    total: Scalar = 0.0
+    for x, y in zip(q, near, strict=True):
+        total = total + (1.0 - cos(x - y))
+    return total
+
+
+def _displacements(T_base_tip: Pose) -> Array:
+    """Poses (N, 4, 4) of a tip beside where it is, as far as walks bring it: parts of the leg's length."""
+    far = float(np.linalg.norm(np.array([T_base_tip.p.x, T_base_tip.p.y, T_base_tip.p.z], dtype=float)))
+    some = []
+    for x, y, z, roll, yaw in product(
+        (-0.2, 0.0, 0.2), (-0.15, 0.0, 0.15), (0.0, 0.1), *[(-0.2, 0.0, 0.2)] * 2
+    ):
+        turn = rotate(Z, yaw) @ rotate(X, roll)
+        some.append(as_array(Pose(turn, Vector(x * far, y * far, z * far))))
+    return np.array(some, dtype=float)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +95,9 @@ class WalkingBody:
         """Joint positions for a waist and soles in the world; other joints rest."""
         base, q = (waist @ self.T_waist_base).inverse, list(rest)
         for leg, foot in zip(self.legs, feet, strict=True):
-            for joint, x in zip(leg.joints, leg.positions(base @ foot), strict=True):
+            for joint, x in zip(
+                leg.joints, leg.positions(base @ foot, [rest[i] for i in leg.joints]), strict=True
+            ):
                 q[joint] = x
         return q
 
