@@ -10,7 +10,7 @@ from pathlib import Path
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE.parent))
 sys.path.insert(0, str(HERE))
-os.environ |= {"TERM": "dumb", "COLUMNS": "96"}  # shell cells: no bars, lines as wide as a page
+os.environ |= {"TTY_INTERACTIVE": "0", "COLUMNS": "96"}  # shell cells: no bars, lines as wide as a page
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])  # of shell cells
 
 import references

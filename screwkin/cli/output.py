@@ -106,9 +106,10 @@ def aligned(rows: Sequence[Sequence[Any]], indent: str = "") -> str:
 def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
     """A bar, percent and remaining time on stderr while it is a terminal that can draw it, and not --quiet.
 
-    Yields a function that takes the share done.
+    ``TERM=dumb`` and ``TTY_INTERACTIVE=0`` say that it cannot. Yields a function that takes the share done.
     """
-    if manners().quiet or not sys.stderr.isatty() or os.environ.get("TERM") in ("dumb", "unknown"):
+    still = os.environ.get("TERM") in ("dumb", "unknown") or os.environ.get("TTY_INTERACTIVE") == "0"
+    if manners().quiet or still or not sys.stderr.isatty():
         yield lambda share: None
         return
     from rich.console import Console

@@ -121,6 +121,15 @@ def test_bars_are_without_colours_where_asked(monkeypatch, way):
     assert not coloured.search(plain)
 
 
+@pytest.mark.parametrize(("name", "value"), [("TERM", "dumb"), ("TTY_INTERACTIVE", "0")])
+def test_no_bar_is_drawn_where_it_could_not_move(monkeypatch, name, value):
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    monkeypatch.setenv(name, value)
+    with progress_bar("walk") as done:
+        done(0.5)
+    assert sys.stderr.written == ""
+
+
 MISSPELT = [
     ("wlak", "walk"),
     ("--verion", "--version"),
