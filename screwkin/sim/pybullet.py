@@ -37,6 +37,7 @@ from screwkin.sim.pybullet_feet import Feet
 from screwkin.sim.pybullet_look import Look, pose_of
 from screwkin.sim.quiet import quiet
 from screwkin.sim.rotors import RelativeRotors, with_rotors
+from screwkin.sim.shod import shod
 from screwkin.sim.table_springs import TableSprings, check_spring_steps
 
 Solver = Literal["direct", "iterative"]
@@ -88,7 +89,7 @@ class PyBulletBackend:
         """Connect and build the world.
 
         Args:
-            robot: closures are welded.
+            robot: closures are welded; feet stand on all of their soles (``shod``).
             physics: see ``Physics``.
             gui: show a window.
             servos: of the joints; rigid by default.
@@ -117,7 +118,7 @@ class PyBulletBackend:
         self._motored = motored(robot)
         rotors = self._servos.rotor_inertia * self._motored
         steadied = not self._servos.relative_rotors
-        opened = replace(solid(with_shared_masses(robot)), closures=())
+        opened = replace(solid(with_shared_masses(shod(robot))), closures=())
         urdf = urdf_of_bodies(with_rotors(opened, rotors, steadied))
         self._p = _imported_pybullet()
         self._client = _connected(self._p, gui)
