@@ -32,7 +32,7 @@ from screwkin.gait.soles import sole_distance
 from screwkin.gait.stance import stance_of
 from screwkin.kinematics.landmarks import waist_frame
 from screwkin.kinematics.mass import GRAVITY
-from screwkin.kinematics.positions import chain_jacobian, successive_displacement
+from screwkin.kinematics.positions import chain_jacobian, successive_displacement, tree_positions
 from screwkin.mechanism.choice import closed_mechanism
 from screwkin.model.robot import Robot
 
@@ -155,14 +155,17 @@ def _ahead(robot: Robot) -> float:
 
 def _standing_share(robot: Robot, tip: str, middle: float) -> float:
     """Share of its torque with which the ankle carries the robot on a point ahead of the tip [m]."""
-    limb, q = robot.limb(tip), robot.posture("home").q
+    limb, every = robot.limb(tip), tree_positions(robot, list(robot.posture("home").q))
     path = robot.path_to(limb.link)
-    screws = [robot.joints[i].screw for i in path]
-    place = successive_displacement(screws, [q[i] for i in path], A_ref_k=limb.frame).p
+    screws, thetas = [robot.tree[i].screw for i in path], [every[i] for i in path]
+    place = successive_displacement(screws, thetas, A_ref_k=limb.frame).p
     axes = as_array(waist_frame(robot).R).astype(float)
     point = as_array(place).astype(float) + middle * axes[:, 0]
-    for i, column in reversed(list(zip(path, chain_jacobian(screws, [q[i] for i in path]), strict=True))):
+    columns = chain_jacobian(screws, thetas)
+    for i, column in reversed(list(zip(path, columns, strict=True))):
         twist: Array = as_array(at(vector_from_array(point), column)).astype(float)
         if abs(twist[:3] @ axes[:, 1]) > _LATERAL * np.linalg.norm(twist[:3]) > 0:
-            return abs(float(twist[3:] @ axes[:, 2])) * float(robot.mass) * GRAVITY / robot.joints[i].effort
+            motor, ratio = robot.gears[i]
+            torque = abs(float(twist[3:] @ axes[:, 2]) * float(ratio)) * float(robot.mass) * GRAVITY
+            return torque / robot.joints[motor].effort
     return 0.0
