@@ -30,7 +30,7 @@ REASONS = {
     r"sphinx": ".ci/run builds the site",
     r"pytest": "the tests themselves",
     r"ruff|mypy": ".ci/run runs it",
-    r"^dask|--cluster": "needs a cluster: tests/analysis/test_cluster.py starts one",
+    r"^dask|--cluster": "needs a cluster: tests/campaign/test_cluster.py starts one",
     r"-m tests\.|-m benchmarks(?! --quick)": "a campaign of minutes to hours, whose results are committed",
 }
 """Lines that are not run, and why."""

@@ -16,7 +16,7 @@ from benchmarks.environments import ROOT
 from benchmarks.machine import pin_threads
 from benchmarks.walking.page import markdown
 from benchmarks.walking.pieces import ENGINES, SERVOS, WAYS, WORLDS, Piece, Row, pieces, row_of
-from screwkin.analysis.campaign import load_seeds
+from screwkin.campaign.plan import load_seeds
 
 SEEDS = Path(__file__).with_name("judging.txt")
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from statistics import median
 
 from benchmarks.walking.pieces import ENGINES, SERVOS, STEPS, WAYS, WORLDS, Row
-from screwkin.analysis.campaign_statistics import mcnemar, wilson
+from screwkin.campaign.statistics import mcnemar, wilson
 
 NAMES = {"mujoco": "MuJoCo", "pybullet": "PyBullet"}
 _HEAD = [

@@ -13,8 +13,8 @@ import numpy as np
 
 import screwkin as sk
 from benchmarks.walking.peer import placo_walk
-from screwkin.analysis.campaign_world import world_of
 from screwkin.analysis.engines import Engine
+from screwkin.campaign.world import world_of
 
 ROBOT = "bioloid"
 USUAL = {"stride": 0.1, "lift": 0.012, "lead": 1.0, "horizon": 1.0}

@@ -30,7 +30,6 @@ from screwkin.gait.balance import zmp as balance_of
 from screwkin.gait.compensation import stiffness_of, way_of
 from screwkin.gait.ground import ground_of
 from screwkin.gait.intended import intended
-from screwkin.gait.stabilised import stabilised
 from screwkin.kinematics.limits import limited_joints
 from screwkin.model.robot import Robot, robot_text
 from screwkin.sim.camera import Camera, Picture
@@ -40,6 +39,7 @@ from screwkin.sim.perturbation import NONE, Perturbation
 from screwkin.sim.render import pictures
 from screwkin.sim.run import Run, simulate
 from screwkin.sim.self_collision import collisions_of_run
+from screwkin.stabiliser.walk import stabilised
 from screwkin.trajectory import Trajectory, check_joints
 
 _MEASURED = (
@@ -100,7 +100,7 @@ def validate(
         check_solver: simulate at half the step and at twice the iterations too; a verdict that this changes,
             or that lies within what it changes, is undecided and has not passed.
         perturbation: what differs from the plan in the simulation; the plan stays what it is judged by.
-        feedback: walk the plan's steps with the stabiliser (``gait.stabilised``), which feels attitude,
+        feedback: walk the plan's steps with the stabiliser (``stabiliser.walk``), which feels attitude,
             joints and feet, in place of its recorded commands.
 
     Returns:

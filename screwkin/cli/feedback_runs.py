@@ -6,11 +6,11 @@ from dataclasses import asdict
 from pathlib import Path
 
 from screwkin.analysis.account import recorded_robot
-from screwkin.analysis.campaign import seeds_from
-from screwkin.analysis.campaign_statistics import wilson
-from screwkin.analysis.campaign_world import check_world
 from screwkin.analysis.engines import servo_for
-from screwkin.analysis.feedback_bound import BOUND, LEAST_RUNS, feedback_bound
+from screwkin.campaign.feedback_bound import BOUND, LEAST_RUNS, feedback_bound
+from screwkin.campaign.plan import seeds_from
+from screwkin.campaign.statistics import wilson
+from screwkin.campaign.world import check_world
 from screwkin.cli.output import print_json, progress_bar
 from screwkin.cli.simulation import engine as engine_named
 from screwkin.errors import InputError

@@ -11,12 +11,11 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import Z, as_array, rotate
-from screwkin.analysis.feedback_bound import FeedbackBound, bound_beside
-from screwkin.analysis.governor import FeedbackGovernor, check_cycle
 from screwkin.analysis.readiness import Ready
+from screwkin.campaign.feedback_bound import FeedbackBound, bound_beside
+from screwkin.campaign.governor import FeedbackGovernor, check_cycle
 from screwkin.compiler.run import compile_program
 from screwkin.errors import InputError
-from screwkin.gait.stabilised import stabilised
 from screwkin.kinematics.body import frame_pose
 from screwkin.model.state import State
 from screwkin.servo.bus import Bus, open_line
@@ -25,6 +24,7 @@ from screwkin.servo.line import ByteLine, Clock, MonotonicClock
 from screwkin.servo.virtual.bus import VirtualBus
 from screwkin.servo.virtual.imu import VirtualImu
 from screwkin.sim.feedback import WalkController
+from screwkin.stabiliser.walk import stabilised
 
 VIRTUAL = "virtual"
 

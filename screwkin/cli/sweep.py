@@ -12,7 +12,11 @@ from typing import Annotated, Any
 import typer
 
 from screwkin.analysis import engines
-from screwkin.analysis.campaign import (
+from screwkin.analysis.engines import SimulatedCompliance
+from screwkin.analysis.verdict import VERSIONED
+from screwkin.campaign.optimum import Search
+from screwkin.campaign.outcome import Outcome
+from screwkin.campaign.plan import (
     CONDITIONS,
     OFF,
     ON,
@@ -23,16 +27,12 @@ from screwkin.analysis.campaign import (
     load_seeds,
     seeds_from,
 )
-from screwkin.analysis.campaign_optimum import Search
-from screwkin.analysis.campaign_outcome import Outcome
-from screwkin.analysis.campaign_row import gait_of, played_row
-from screwkin.analysis.campaign_run import Workers, local_workers, outcomes
-from screwkin.analysis.campaign_sheet import finished_rows, rows_arrays, rows_csv, settings_csv
-from screwkin.analysis.campaign_statistics import Paired, Tally, comparisons, tallies, tally
-from screwkin.analysis.campaign_store import Journal, journal
-from screwkin.analysis.campaign_world import AS_PLANNED, check_world
-from screwkin.analysis.engines import SimulatedCompliance
-from screwkin.analysis.verdict import VERSIONED
+from screwkin.campaign.row import gait_of, played_row
+from screwkin.campaign.run import Workers, local_workers, outcomes
+from screwkin.campaign.sheet import finished_rows, rows_arrays, rows_csv, settings_csv
+from screwkin.campaign.statistics import Paired, Tally, comparisons, tallies, tally
+from screwkin.campaign.store import Journal, journal
+from screwkin.campaign.world import AS_PLANNED, check_world
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, FittingGait, GaitName, OutputFolder, RobotName, settings
 from screwkin.cli.output import aligned, drawn, print_json, progress_bar, remark, say
@@ -226,7 +226,7 @@ def _workers(jobs: int, address: str | None) -> AbstractContextManager[Workers]:
     """Processes of this computer, or those of a cluster."""
     if address is None:
         return nullcontext(local_workers(jobs))
-    from screwkin.analysis.cluster import cluster_workers
+    from screwkin.campaign.cluster import cluster_workers
 
     return cluster_workers(address)
 

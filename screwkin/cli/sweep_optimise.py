@@ -7,13 +7,13 @@ from contextlib import AbstractContextManager
 from functools import partial
 from pathlib import Path
 
-from screwkin.analysis.campaign import CampaignRow
-from screwkin.analysis.campaign_optimum import Optimum, Search, check_search, optimum
-from screwkin.analysis.campaign_outcome import Outcome
-from screwkin.analysis.campaign_row import gait_of, played_row
-from screwkin.analysis.campaign_run import Workers, outcomes, standing_workers
-from screwkin.analysis.campaign_statistics import tally
-from screwkin.analysis.campaign_store import journal
+from screwkin.campaign.optimum import Optimum, Search, check_search, optimum
+from screwkin.campaign.outcome import Outcome
+from screwkin.campaign.plan import CampaignRow
+from screwkin.campaign.row import gait_of, played_row
+from screwkin.campaign.run import Workers, outcomes, standing_workers
+from screwkin.campaign.statistics import tally
+from screwkin.campaign.store import journal
 from screwkin.cli.folder import output_folder
 from screwkin.cli.output import print_json, progress_bar, say
 from screwkin.errors import InputError

@@ -12,8 +12,8 @@ import typer
 from screwkin.analysis.account import account_of, recorded_robot
 from screwkin.analysis.clear_hands import clearing_hand_drop
 from screwkin.analysis.engines import AUTO, SimulatedCompliance, servo_for
-from screwkin.analysis.feedback_bound import WORLDS
 from screwkin.analysis.verdict import verdict_of
+from screwkin.campaign.feedback_bound import WORLDS
 from screwkin.cli.feedback_runs import feedback_runs
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, OutputFolder, Perturbed, TrajectoryPath, perturbation_of

@@ -17,7 +17,6 @@ from screwkin.compliance import deflection
 from screwkin.dynamics.margin import margin
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.export.quantities import QUANTITIES, programs
-from screwkin.gait.stabilised import cycle_in_a_step, stabiliser_of
 from screwkin.ik import programs as limbs
 from screwkin.ik.closed import recognised
 from screwkin.kinematics.mass import GRAVITY
@@ -25,6 +24,7 @@ from screwkin.kinematics.positions import link_displacements, pose_in_base
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.mechanism.tip_motion import motion_program
 from screwkin.model.robot import Robot
+from screwkin.stabiliser.walk import cycle_in_a_step, stabiliser_of
 
 TOLERANCE: Mapping[Real, float] = {"double": 1e-12, "float": 1e-5}
 """Largest difference that the driver accepts, relative to the largest entry of a result (at least 1)."""

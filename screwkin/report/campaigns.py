@@ -7,9 +7,9 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.analysis.campaign import Campaign
-from screwkin.analysis.campaign_outcome import Outcome
-from screwkin.analysis.campaign_statistics import Tally, tally
+from screwkin.campaign.outcome import Outcome
+from screwkin.campaign.plan import Campaign
+from screwkin.campaign.statistics import Tally, tally
 from screwkin.report.style import MEASURED, PLAIN, ZMP, Axes, Figure, new_figure
 
 Grid = Sequence[Sequence[Tally]]

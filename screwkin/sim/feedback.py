@@ -11,12 +11,12 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import Z, as_array, rotate, rotation_exp, vector_from_array
 from screwkin.dynamics.terrain import Terrain
-from screwkin.gait.rhythm import CYCLE
-from screwkin.gait.stabilised import Felt, StabilisedWalk
 from screwkin.kinematics.limits import limited_joints, limits_of
 from screwkin.model.robot import Robot
 from screwkin.sim.backend import Observation
 from screwkin.sim.perturbation import Perturbation
+from screwkin.stabiliser.rhythm import CYCLE
+from screwkin.stabiliser.walk import Felt, StabilisedWalk
 from screwkin.trajectory import Trajectory
 
 NOTHING = 1e-6

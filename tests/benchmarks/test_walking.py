@@ -12,8 +12,8 @@ import screwkin as sk
 from benchmarks.walking import __main__ as command
 from benchmarks.walking.page import markdown
 from benchmarks.walking.pieces import WAYS, WORLDS, Piece, Row, pieces
-from screwkin.analysis.campaign import load_seeds
-from screwkin.analysis.campaign_world import world_of
+from screwkin.campaign.plan import load_seeds
+from screwkin.campaign.world import world_of
 
 HERE = Path(command.__file__).parent
 

@@ -14,19 +14,19 @@ from hypothesis import strategies as st
 
 import screwkin as sk
 from screwkin.algebra.se3 import Y, as_array, rotate
-from screwkin.analysis import feedback_bound as bounding
 from screwkin.analysis.engines import simulated_on
-from screwkin.analysis.feedback_bound import BOUND, FARTHEST, WORLDS, FeedbackBound, bound_faults
-from screwkin.analysis.governor import OLDEST, SLACK, FeedbackGovernor
 from screwkin.analysis.verdict import Verdict, verdict_from_json
+from screwkin.campaign import feedback_bound as bounding
+from screwkin.campaign.feedback_bound import BOUND, FARTHEST, WORLDS, FeedbackBound, bound_faults
+from screwkin.campaign.governor import OLDEST, SLACK, FeedbackGovernor
 from screwkin.cli import run
-from screwkin.gait.stabilised import StabilisedWalk, stabilised
-from screwkin.gait.stabiliser_law import Gains
 from screwkin.model.robot import Robot
 from screwkin.servo.imu import ImuReading
 from screwkin.servo.log import load_log
 from screwkin.servo.watch import PlayStopped
 from screwkin.sim.feedback import WalkController
+from screwkin.stabiliser.law import Gains
+from screwkin.stabiliser.walk import StabilisedWalk, stabilised
 from screwkin.trajectory import load_trajectory
 from tests.cli.conftest import told_once
 from tests.verdicts import passing

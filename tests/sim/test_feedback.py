@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 import screwkin as sk
 from screwkin.algebra.se3 import X, Z, as_array, rotate
 from screwkin.errors import InputError
-from screwkin.gait.stabilised import Felt, stabilised
 from screwkin.kinematics.limits import limited_joints, limits_of
 from screwkin.model.robot import Robot
 from screwkin.sim.backend import Contact, Observation
 from screwkin.sim.feedback import Senses, WalkController
 from screwkin.sim.perturbation import NONE, Perturbation
 from screwkin.sim.perturbation_files import perturbation_from_texts
+from screwkin.stabiliser.walk import Felt, stabilised
 
 FEET = ("right_foot", "left_foot")
 PERIOD = 0.01

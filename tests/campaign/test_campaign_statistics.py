@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from screwkin.analysis.campaign import Campaign
-from screwkin.analysis.campaign_outcome import STATUSES, Outcome
-from screwkin.analysis.campaign_statistics import comparisons, paired, tallies, tally, wilson
+from screwkin.campaign.outcome import STATUSES, Outcome
+from screwkin.campaign.plan import Campaign
+from screwkin.campaign.statistics import comparisons, paired, tallies, tally, wilson
 
 Z = 1.959963984540054
 STATUS = st.sampled_from(STATUSES)

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from screwkin.analysis.campaign import Campaign
-from screwkin.analysis.campaign_optimum import Search, check_search, optimum
-from screwkin.analysis.campaign_outcome import Outcome
+from screwkin.campaign.optimum import Search, check_search, optimum
+from screwkin.campaign.outcome import Outcome
+from screwkin.campaign.plan import Campaign
 from screwkin.errors import InputError, NoSolutionError
 
 AXES = {"gait": ("walk",), "engine": ("kinematic",), "Tc": ("1",), "sway": ("1",)}

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from screwkin.analysis.campaign import (
+from screwkin.campaign.plan import (
     MOST_ROWS,
     Campaign,
     axis_values,

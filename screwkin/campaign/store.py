@@ -13,8 +13,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO, Self
 
-from screwkin.analysis.campaign import differing_keys
-from screwkin.analysis.campaign_outcome import Outcome, outcome_from_dict
+from screwkin.campaign.outcome import Outcome, outcome_from_dict
+from screwkin.campaign.plan import differing_keys
 from screwkin.errors import InputError, OutputError
 from screwkin.files import atomic_write, read_file, read_json
 

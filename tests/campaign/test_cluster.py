@@ -10,10 +10,10 @@ import sys
 
 import pytest
 
-from screwkin.analysis.campaign_run import outcomes
-from screwkin.analysis.cluster import cluster_workers
+from screwkin.campaign.cluster import cluster_workers
+from screwkin.campaign.run import outcomes
 from screwkin.errors import InputError, MissingDependencyError
-from tests.analysis.campaign_worker import LETHAL, PLAN, lethal_play, play
+from tests.campaign.worker import LETHAL, PLAN, lethal_play, play
 
 DASK = importlib.util.find_spec("distributed") is not None
 needs_dask = pytest.mark.skipif(not DASK, reason='python -m pip install "screwkin[cluster]"')

@@ -6,9 +6,9 @@ import pytest
 
 import screwkin as sk
 from screwkin.errors import InputError
-from screwkin.gait.walking_body import body_of
 from screwkin.model.robot import robot_text
 from screwkin.model.table import robot_from_text
+from screwkin.stabiliser.body import body_of
 
 
 def test_a_leg_whose_branches_swap_numbers_is_refused() -> None:

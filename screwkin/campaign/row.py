@@ -9,11 +9,11 @@ from typing import cast
 
 import numpy as np
 
-from screwkin.analysis.campaign import CONDITIONS, ON, Campaign, CampaignRow
-from screwkin.analysis.campaign_outcome import Outcome, crashed
-from screwkin.analysis.campaign_world import world_of
 from screwkin.analysis.engines import Engine, confirms
 from screwkin.analysis.validate import Validation, validate
+from screwkin.campaign.outcome import Outcome, crashed
+from screwkin.campaign.plan import CONDITIONS, ON, Campaign, CampaignRow
+from screwkin.campaign.world import world_of
 from screwkin.errors import NoSolutionError
 from screwkin.gait.record import Gait, gait_from_dict
 from screwkin.gait.walk import walk

@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass
 from statistics import median
 from typing import Any
 
-from screwkin.analysis.campaign import Campaign
-from screwkin.analysis.campaign_outcome import STATUSES, Outcome
+from screwkin.campaign.outcome import STATUSES, Outcome
+from screwkin.campaign.plan import Campaign
 
 CONFIDENCE = 0.95
 

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 import screwkin as sk
 from screwkin.algebra.se3 import Z, as_array, rotate
-from screwkin.gait.odometry import BACK, SHARE, Whereabouts, back_to_plan, joined_place, seen_from
-from screwkin.gait.stabilised import Felt, StabilisedWalk, stabilised
 from screwkin.model.robot import Robot
+from screwkin.stabiliser.odometry import BACK, SHARE, Whereabouts, back_to_plan, joined_place, seen_from
+from screwkin.stabiliser.walk import Felt, StabilisedWalk, stabilised
 
 FEET = ("left_foot", "right_foot")
 places = st.tuples(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(-3.0, 3.0)).map(np.array)

@@ -11,12 +11,12 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array, pose_from_array
 from screwkin.errors import InputError
 from screwkin.gait.ground import ground_of
-from screwkin.gait.stabiliser import STARTING, Memory
-from screwkin.gait.stabiliser_law import Rhythm
-from screwkin.gait.walking_body import WalkingBody
 from screwkin.kinematics.body import center_of_mass
 from screwkin.kinematics.mass import GRAVITY
 from screwkin.model.state import State
+from screwkin.stabiliser.body import WalkingBody
+from screwkin.stabiliser.cycle import STARTING, Memory
+from screwkin.stabiliser.law import Rhythm
 from screwkin.trajectory import Trajectory
 
 CYCLE = 0.01

@@ -12,14 +12,14 @@ from typing import NoReturn
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.analysis.feedback_bound import FeedbackBound
+from screwkin.campaign.feedback_bound import FeedbackBound
 from screwkin.errors import InputError
-from screwkin.gait.stabilised import Felt
 from screwkin.kinematics.body import frame_pose
 from screwkin.model.state import State
 from screwkin.servo.imu import Imu
 from screwkin.servo.watch import PlayStopped, ServoFault
 from screwkin.sim.feedback import WalkController
+from screwkin.stabiliser.walk import Felt
 
 OLDEST = 0.05
 """Of the IMU's newest frame [s]."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any, Literal
 
-from screwkin.analysis.campaign import CampaignRow
+from screwkin.campaign.plan import CampaignRow
 
 Status = Literal["stood", "fell", "planned", "refused", "crashed"]
 STATUSES: tuple[Status, ...] = ("stood", "fell", "planned", "refused", "crashed")

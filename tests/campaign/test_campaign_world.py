@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import screwkin as sk
-from screwkin.analysis.campaign_world import AS_PLANNED, check_world, spread_of, world_of
+from screwkin.campaign.world import AS_PLANNED, check_world, spread_of, world_of
 from screwkin.errors import InputError
 from screwkin.sim.drawn import NOWHERE, Spread, drawn_world
 from screwkin.sim.perturbation import NONE

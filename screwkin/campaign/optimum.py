@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.analysis.campaign import Campaign, CampaignRow
-from screwkin.analysis.campaign_outcome import Outcome
-from screwkin.analysis.campaign_statistics import tally
+from screwkin.campaign.outcome import Outcome
+from screwkin.campaign.plan import Campaign, CampaignRow
+from screwkin.campaign.statistics import tally
 from screwkin.errors import InputError, NoSolutionError, one_of
 
 OBJECTIVES = ("margin", "falls")

@@ -16,9 +16,12 @@ from screwkin.compiler.records import identifier
 from screwkin.compiler.run import run
 from screwkin.errors import InputError
 from screwkin.gait.intended import intended
-from screwkin.gait.odometry import Whereabouts, back_to_plan
-from screwkin.gait.rhythm import CYCLE, footholds_of, rhythm_of, share_of, start_of, steps_of, swings_of
-from screwkin.gait.stabiliser import (
+from screwkin.gait.stance import stance_of
+from screwkin.kinematics.body import center_of_mass, frame_pose
+from screwkin.model.robot import Robot
+from screwkin.model.state import State
+from screwkin.stabiliser.body import WalkingBody, body_of
+from screwkin.stabiliser.cycle import (
     STARTING,
     STEPPING,
     STOPPING,
@@ -28,12 +31,9 @@ from screwkin.gait.stabiliser import (
     StabilisedBody,
     cycle,
 )
-from screwkin.gait.stabiliser_law import Gains, Rhythm, of_row, row, scalars_in
-from screwkin.gait.stance import stance_of
-from screwkin.gait.walking_body import WalkingBody, body_of
-from screwkin.kinematics.body import center_of_mass, frame_pose
-from screwkin.model.robot import Robot
-from screwkin.model.state import State
+from screwkin.stabiliser.law import Gains, Rhythm, of_row, row, scalars_in
+from screwkin.stabiliser.odometry import Whereabouts, back_to_plan
+from screwkin.stabiliser.rhythm import CYCLE, footholds_of, rhythm_of, share_of, start_of, steps_of, swings_of
 from screwkin.trajectory import Trajectory
 
 T = TypeVar("T")
@@ -191,7 +191,7 @@ def stabilised(robot: Robot, trajectory: Trajectory, gains: Gains | None = None)
 
     Example:
         >>> import screwkin as sk
-        >>> from screwkin.gait.stabilised import stabilised
+        >>> from screwkin.stabiliser.walk import stabilised
         >>> robot = sk.load_robot(sk.robot_names()[0])
         >>> gait = sk.load_gait("preview").replace(Tc=0.5, stride=0.05, lift=0.015, lead=1.0)
         >>> walk = stabilised(robot, sk.walk(robot, gait, steps=3))

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from screwkin.algebra.arrays import Array
-from screwkin.analysis.campaign import Campaign, CampaignRow
-from screwkin.analysis.campaign_outcome import MEASURES, STATUSES, Outcome
-from screwkin.analysis.campaign_statistics import Tally
+from screwkin.campaign.outcome import MEASURES, STATUSES, Outcome
+from screwkin.campaign.plan import Campaign, CampaignRow
+from screwkin.campaign.statistics import Tally
 
 Finished = Sequence[tuple[CampaignRow, Outcome]]
 

@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
-from screwkin.analysis.campaign_world import world_of
 from screwkin.analysis.engines import Engine, confirms
 from screwkin.analysis.validate import validate
 from screwkin.analysis.verdict import VERSIONED, Verdict, bound_to
+from screwkin.campaign.world import world_of
 from screwkin.errors import InputError, SafetyError
 from screwkin.files import LARGEST_TEXT, read_file, read_json, text_sha256, versions
-from screwkin.gait.stabiliser_law import Gains
 from screwkin.model.robot import Robot, robot_text
+from screwkin.stabiliser.law import Gains
 from screwkin.trajectory import Trajectory
 
 BOUND = "feedback.json"

@@ -13,8 +13,8 @@ from multiprocessing import active_children, get_context, parent_process
 from threading import Thread
 from typing import Any
 
-from screwkin.analysis.campaign import CampaignRow
-from screwkin.analysis.campaign_outcome import Outcome, crashed
+from screwkin.campaign.outcome import Outcome, crashed
+from screwkin.campaign.plan import CampaignRow
 
 ONE_THREAD = {
     "OMP_NUM_THREADS": "1",

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from screwkin.analysis.campaign import Campaign
-from screwkin.analysis.campaign_outcome import STATUSES, Outcome
-from screwkin.analysis.campaign_store import PLAN, ROWS, journal
+from screwkin.campaign.outcome import STATUSES, Outcome
+from screwkin.campaign.plan import Campaign
+from screwkin.campaign.store import PLAN, ROWS, journal
 from screwkin.errors import InputError, OutputError
 
 PLAN_OF_THREE = Campaign("robot", {"walk": "{}"}, {"Tc": ("1", "2", "3")}, (5,), {"screwkin": "1"})

@@ -12,7 +12,10 @@ from dataclasses import dataclass
 
 from screwkin.algebra.scalar import Scalar, atan2, cos, larger, sin, sqrt, where
 from screwkin.algebra.se3 import Pose, Rotation, Vector, X, Y, Z, leaves, rotate
-from screwkin.gait.stabiliser_law import (
+from screwkin.kinematics.mass import mass_center
+from screwkin.kinematics.positions import link_displacements, pose_in_base
+from screwkin.stabiliser.body import WalkingBody
+from screwkin.stabiliser.law import (
     Gains,
     Landing,
     Pair,
@@ -31,9 +34,6 @@ from screwkin.gait.stabiliser_law import (
     step_landing,
     stopping_zmp,
 )
-from screwkin.gait.walking_body import WalkingBody
-from screwkin.kinematics.mass import mass_center
-from screwkin.kinematics.positions import link_displacements, pose_in_base
 
 Place = tuple[Scalar, Scalar, Scalar]
 """x, y, yaw of a foot on the floor."""

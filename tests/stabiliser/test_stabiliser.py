@@ -15,9 +15,16 @@ import screwkin as sk
 from screwkin.algebra.se3 import Pose, Rotation, Vector, X, as_array, pose_from_array, rotate
 from screwkin.compiler.run import run
 from screwkin.errors import InputError
-from screwkin.gait import stabiliser_law as law
-from screwkin.gait.rhythm import CYCLE
-from screwkin.gait.stabilised import (
+from screwkin.model.robot import Robot
+from screwkin.sim.feedback import WalkController
+from screwkin.stabiliser import law as law
+from screwkin.stabiliser.cycle import STARTING, STEPPING, STOPPING, Memory
+from screwkin.stabiliser.law import (
+    Gains,
+    Rhythm,
+)
+from screwkin.stabiliser.rhythm import CYCLE
+from screwkin.stabiliser.walk import (
     Felt,
     StabilisedState,
     StabilisedWalk,
@@ -25,13 +32,6 @@ from screwkin.gait.stabilised import (
     stabilised,
     stabiliser_of,
 )
-from screwkin.gait.stabiliser import STARTING, STEPPING, STOPPING, Memory
-from screwkin.gait.stabiliser_law import (
-    Gains,
-    Rhythm,
-)
-from screwkin.model.robot import Robot
-from screwkin.sim.feedback import WalkController
 from screwkin.trajectory import Trajectory
 
 States = list[StabilisedState]

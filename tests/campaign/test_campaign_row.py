@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import screwkin as sk
-from screwkin.analysis import campaign_row
-from screwkin.analysis.campaign import Campaign, CampaignRow
-from screwkin.analysis.campaign_outcome import Outcome, outcome_from_dict
-from screwkin.analysis.campaign_row import gait_of, played_row, walk_of_setting
-from screwkin.analysis.campaign_sheet import finished_rows, rows_arrays, rows_csv
+from screwkin.campaign import row as campaign_row
+from screwkin.campaign.outcome import Outcome, outcome_from_dict
+from screwkin.campaign.plan import Campaign, CampaignRow
+from screwkin.campaign.row import gait_of, played_row, walk_of_setting
+from screwkin.campaign.sheet import finished_rows, rows_arrays, rows_csv
 from screwkin.errors import GaitError, UnreachableError
 from screwkin.files import npz_bytes, read_npz
 from screwkin.model.robot import robot_text

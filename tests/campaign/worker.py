@@ -1,6 +1,6 @@
 """A campaign of rows that cost nothing, some of which end their process; and a program that plays it.
 
-python -m tests.analysis.campaign_worker FOLDER JOBS
+python -m tests.campaign.worker FOLDER JOBS
 """
 
 from __future__ import annotations
@@ -10,10 +10,10 @@ import sys
 import time
 from pathlib import Path
 
-from screwkin.analysis.campaign import Campaign, CampaignRow
-from screwkin.analysis.campaign_outcome import Outcome
-from screwkin.analysis.campaign_run import local_workers, outcomes
-from screwkin.analysis.campaign_store import journal
+from screwkin.campaign.outcome import Outcome
+from screwkin.campaign.plan import Campaign, CampaignRow
+from screwkin.campaign.run import local_workers, outcomes
+from screwkin.campaign.store import journal
 
 PLAN = Campaign("", {}, {"Tc": tuple(map(str, range(4)))}, tuple(range(10, 20)), {})
 LETHAL = 7

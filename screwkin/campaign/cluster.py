@@ -7,7 +7,7 @@ from concurrent.futures import Executor
 from contextlib import contextmanager
 from typing import Any
 
-from screwkin.analysis.campaign_run import Workers
+from screwkin.campaign.run import Workers
 from screwkin.errors import InputError, MissingDependencyError
 from screwkin.files import versions
 

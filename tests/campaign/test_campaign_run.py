@@ -16,10 +16,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from screwkin.analysis.campaign_outcome import Outcome
-from screwkin.analysis.campaign_run import Workers, local_workers, outcomes
-from screwkin.analysis.campaign_store import ROWS, journal
-from tests.analysis.campaign_worker import LETHAL, PLAN, lethal_play, play, threads
+from screwkin.campaign.outcome import Outcome
+from screwkin.campaign.run import Workers, local_workers, outcomes
+from screwkin.campaign.store import ROWS, journal
+from tests.campaign.worker import LETHAL, PLAN, lethal_play, play, threads
 
 
 @given(st.integers(1, 9), st.randoms(use_true_random=False))
@@ -105,7 +105,7 @@ def _children(pid: int) -> list[int]:
 @pytest.mark.skipif(not hasattr(os, "kill") or sys.platform == "win32", reason="SIGKILL is POSIX")
 def test_a_campaign_killed_at_any_moment_resumes_without_loss_or_doubles(tmp_path):
     """A real program of two workers is killed at a random number of rows; its workers end with it."""
-    program = subprocess.Popen([sys.executable, "-m", "tests.analysis.campaign_worker", tmp_path, "2"])
+    program = subprocess.Popen([sys.executable, "-m", "tests.campaign.worker", tmp_path, "2"])
     target = random.randint(1, 20)
     while _lines(tmp_path) < target and program.poll() is None:
         time.sleep(0.002)
@@ -114,7 +114,7 @@ def test_a_campaign_killed_at_any_moment_resumes_without_loss_or_doubles(tmp_pat
     assert program.wait() == -signal.SIGKILL
     assert target <= _lines(tmp_path) < 40
     _wait(lambda: not any(_alive(worker) for worker in workers))
-    subprocess.run([sys.executable, "-m", "tests.analysis.campaign_worker", tmp_path, "2"], check=True)
+    subprocess.run([sys.executable, "-m", "tests.campaign.worker", tmp_path, "2"], check=True)
     assert _lines(tmp_path) == 40
     with journal(tmp_path, PLAN.to_dict()) as rows:
         assert [rows.outcomes[row.index] for row in PLAN.rows] == [play(row) for row in PLAN.rows]

@@ -1,0 +1,1 @@
+"""Campaigns: a walk under many settings in many worlds, resumable, on any workers; and what they permit."""
