@@ -48,3 +48,9 @@ def x64() -> Iterator[None]:
 
     with jax.enable_x64(True), jax.numpy_dtype_promotion("strict"), jax.numpy_rank_promotion("raise"):
         yield
+
+
+@pytest.fixture(autouse=True)
+def _no_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lines are as long as they are, whatever width a shell or a library has named."""
+    monkeypatch.delenv("COLUMNS", raising=False)

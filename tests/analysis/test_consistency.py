@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -29,10 +30,22 @@ def walk(robot: Robot) -> Trajectory:
     return sk.walk(robot, sk.load_gait("smooth"), steps=2)
 
 
-@pytest.mark.parametrize("settings", [{}, {"Tc": 0.6}, {"rate": 25}, {"rate": 200, "ramp": 0}])
-@pytest.mark.parametrize("gait", OF_BIOLOID)
+SETTINGS: list[dict[str, Any]] = [{}, {"Tc": 0.6}, {"rate": 25}, {"rate": 200, "ramp": 0}]
+EASED = 3
+"""Samples in which an even swing speeds up, at least: fewer cannot show that it does."""
+
+
+@pytest.mark.parametrize(("gait", "settings"), [*product(OF_BIOLOID, SETTINGS)])
 def test_walks_agree_with_themselves(robot: Robot, gait: str, settings: dict[str, Any]) -> None:
-    assert motion_faults(robot, sk.walk(robot, sk.load_gait(gait).replace(**settings), steps=2)) == ()
+    chosen = sk.load_gait(gait).replace(**settings)
+    at = chosen.channels["foot_height"].at
+    eased = chosen.ease * float(at[-1] - at[0]) * chosen.Tc * chosen.rate if chosen.swing == "even" else EASED
+    faults = motion_faults(robot, sk.walk(robot, chosen, steps=2))
+    if eased < EASED:
+        assert faults
+        assert all("that samples so far apart leave open" in fault for fault in faults)
+    else:
+        assert faults == ()
 
 
 def test_walks_of_other_robots_agree_with_themselves() -> None:

@@ -107,7 +107,7 @@ def test_rates_and_accelerations_of_a_chain_give_back_those_of_its_coordinates(c
 @pytest.mark.parametrize(
     ("chain", "message"),
     [
-        (("px", "qx"), "unknown coupling 'qx'; valid: px, py, pz, rx, ry, rz"),
+        (("px", "qx"), "unknown coupling 'qx'. Valid: px, py, pz, rx, ry, rz"),
         (("px", "px"), "a coupling stands twice"),
         (("rx", "px"), r"translations come first; write \('px', 'rx'\)"),
     ],

@@ -11,7 +11,8 @@ ROOT = Path(__file__).resolve().parents[2]
 SOURCES = [
     *(ROOT / "screwkin" / "servo").glob("*.py"),
     *(ROOT / "screwkin" / "cli").glob("*.py"),
-    *(ROOT / "screwkin" / "analysis" / f"{name}.py" for name in ("readiness", "feedback_bound", "governor")),
+    ROOT / "screwkin" / "analysis" / "readiness.py",
+    *(ROOT / "screwkin" / "campaign" / f"{name}.py" for name in ("feedback_bound", "governor")),
 ]
 SAID = re.sub(r'"\s*f?"', "", "".join(path.read_text("utf-8") for path in SOURCES))
 """The program's text; what stands on several lines of it joined."""
