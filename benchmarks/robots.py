@@ -125,6 +125,7 @@ def page_of(rows: Sequence[Row]) -> str:
         "",
         f"{len(walked)} of {len(rows)} files that were tried walk in both engines. Of the {len(unseen)} with",
         f"a star, chosen after the rules of the search had been frozen and tried once, {unseen_walk} do.",
+        "Rows without a star may be older than these rules; `--again` makes them anew.",
         "",
         "| robot | joints | legs, arms | leg IK | solved | anatomy | gait | MuJoCo | PyBullet |",
         "|---|---|---|---|---|---|---|---|---|",
