@@ -34,7 +34,7 @@ REASONS = {
     r"-m tests\.|-m benchmarks(?! --quick)": "a campaign of minutes to hours, whose results are committed",
 }
 """Lines that are not run, and why."""
-SHORTER = {"--runs 60": "--runs 1", "--runs 8": "--runs 1", "--evaluations 48": "--evaluations 12"}
+SHORTER = {"--runs 8": "--runs 1", "--evaluations 48": "--evaluations 12"}
 """What is less of the same."""
 SHIM = """#!/bin/bash
 limit=; [ "$1" = view ] && limit="timeout -s INT 25"
