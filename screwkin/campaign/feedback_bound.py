@@ -12,13 +12,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from screwkin.analysis.engines import Engine, confirms
 from screwkin.analysis.validate import validate
 from screwkin.analysis.verdict import VERSIONED, Verdict, bound_to
-from screwkin.campaign.world import world_of
+from screwkin.campaign.world import world_along
 from screwkin.errors import InputError, SafetyError
 from screwkin.files import LARGEST_TEXT, read_file, read_json, text_sha256, versions
 from screwkin.model.robot import Robot, robot_text
@@ -78,11 +77,9 @@ def feedback_bound(
     """
     if not confirms(engine):
         raise InputError(f"engine {engine} simulates no falls; take mujoco or pybullet")
-    x, falls = trajectory.T_world_base[:, 0, 3], 0
-    distance = float(np.abs(x - x[0]).max())
-    farthest, on = dict.fromkeys(robot.joint_names, 0.0), servo
+    farthest, on, falls = dict.fromkeys(robot.joint_names, 0.0), servo, 0
     for k, seed in enumerate(seeds):
-        world = world_of(worlds, robot, seed, trajectory.duration, distance)
+        world = world_along(worlds, robot, seed, trajectory)
         check = validate(robot, trajectory, engine, servo=servo, perturbation=world, feedback=True)
         on, came = check.servo, check.engine_settings[engine]["feedback"]["deviation"]
         falls += check.fell

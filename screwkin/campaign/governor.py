@@ -96,7 +96,7 @@ class FeedbackGovernor:
         goal = self._controller.answer(felt)
         self._frames += 1
         over = self._controller.deviation - self._bound
-        if over.max() > 0.0:
+        if not (over <= 0.0).all():  # a number that is none is within no bound
             k = int(over.argmax())
             self._stop(
                 time,

@@ -7,13 +7,11 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import cast
 
-import numpy as np
-
 from screwkin.analysis.engines import Engine, confirms
 from screwkin.analysis.validate import Validation, validate
 from screwkin.campaign.outcome import Outcome, crashed
 from screwkin.campaign.plan import CONDITIONS, ON, Campaign, CampaignRow
-from screwkin.campaign.world import world_of
+from screwkin.campaign.world import world_along
 from screwkin.errors import NoSolutionError
 from screwkin.gait.record import Gait, gait_from_dict
 from screwkin.gait.walk import walk
@@ -91,10 +89,7 @@ def _planned(
 
 
 def _world(row: CampaignRow, robot: Robot, trajectory: Trajectory) -> Perturbation:
-    way = trajectory.T_world_base[:, 0, 3]
-    return world_of(
-        row.values["perturb"], robot, row.seed, trajectory.duration, float(np.abs(way - way[0]).max())
-    )
+    return world_along(row.values["perturb"], robot, row.seed, trajectory)
 
 
 def _outcome(row: CampaignRow, check: Validation, world: Perturbation) -> Outcome:

@@ -12,12 +12,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from screwkin.errors import InputError, near
 from screwkin.model.expression import ExpressionError, evaluate
 from screwkin.model.robot import Robot
 from screwkin.sim.drawn import NOWHERE, Spread, drawn_world
 from screwkin.sim.perturbation import BY_NAME, DEFAULTS, NONE, Perturbation, by_name
 from screwkin.sim.perturbation_files import perturbation_from_texts
+from screwkin.trajectory import Trajectory
 
 AS_PLANNED = "none"
 """The text of the planned world."""
@@ -46,6 +49,12 @@ def world_of(text: str, robot: Robot, seed: int, duration: float, distance: floa
     )
     own = perturbation_from_texts(fixed)
     return replace(world, **{key: getattr(own, key) for key in own.to_dict()})
+
+
+def world_along(text: str, robot: Robot, seed: int, trajectory: Trajectory) -> Perturbation:
+    """The world in which a walk is played: as ``world_of``, for its duration and as far as its base goes."""
+    x = trajectory.T_world_base[:, 0, 3]
+    return world_of(text, robot, seed, trajectory.duration, float(np.abs(x - x[0]).max()))
 
 
 def check_world(text: str, robot: Robot) -> None:
