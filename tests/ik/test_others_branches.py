@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+import sysconfig
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -128,27 +129,26 @@ def test_branches_of_bundled_legs(name: str) -> None:
             assert_all_of_eaik_s_branches_are_found(SerialChain.of(robot, limb.name))
 
 
-def chains_of(folder: Path) -> Iterator[SerialChain]:
-    """The last six revolute joints above every leaf of every URDF file, by Pinocchio."""
+def chains_of(file: Path) -> Iterator[SerialChain]:
+    """The last six revolute joints above every leaf of a URDF file, by Pinocchio."""
     pin = pytest.importorskip("pinocchio")
-    for file in sorted(folder.glob("*/*/*.urdf")):
-        try:
-            model = pin.buildModelFromUrdf(str(file))
-        except (ValueError, RuntimeError):  # what Pinocchio does not read is no limb
+    try:
+        model = pin.buildModelFromUrdf(str(file))
+    except (ValueError, RuntimeError):  # what Pinocchio does not read is no limb
+        return
+    data = model.createData()
+    pin.computeJointJacobians(model, data, pin.neutral(model))
+    for leaf in range(1, model.njoints):
+        path = list(model.supports[leaf])[1:][-6:]
+        single = all(model.joints[j].nv == 1 and "R" in model.joints[j].shortname() for j in path)
+        if len(model.children[leaf]) or len(path) < 6 or not single:
             continue
-        data = model.createData()
-        pin.computeJointJacobians(model, data, pin.neutral(model))
-        for leaf in range(1, model.njoints):
-            path = list(model.supports[leaf])[1:][-6:]
-            single = all(model.joints[j].nv == 1 and "R" in model.joints[j].shortname() for j in path)
-            if len(model.children[leaf]) or len(path) < 6 or not single:
-                continue
-            screws = []
-            for j in path:
-                J = pin.getJointJacobian(model, data, j, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
-                axis = J[3:, model.joints[j].idx_v]
-                screws.append(Screw(Vector(*map(float, axis)), Vector(*map(float, data.oMi[j].translation))))
-            yield chain_of(screws, f"{file.stem} {model.names[leaf]}")
+        screws = []
+        for j in path:
+            J = pin.getJointJacobian(model, data, j, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+            axis = J[3:, model.joints[j].idx_v]
+            screws.append(Screw(Vector(*map(float, axis)), Vector(*map(float, data.oMi[j].translation))))
+        yield chain_of(screws, f"{file.stem} {model.names[leaf]}")
 
 
 def chain_of(screws: list[Screw], name: str) -> SerialChain:
@@ -162,23 +162,24 @@ def chain_of(screws: list[Screw], name: str) -> SerialChain:
     return SerialChain(name, names, tuple(range(6)), near, pose_from_array(tip), -ends, ends, turning, length)
 
 
+def robot_files() -> list[Path]:
+    """URDF files of example-robot-data, or of the folder ``SCREWKIN_ROBOTS``."""
+    share = Path(sysconfig.get_path("purelib"), "cmeel.prefix", "share", "example-robot-data", "robots")
+    return sorted(Path(os.environ.get("SCREWKIN_ROBOTS", share)).glob("*/*/*.urdf"))
+
+
+def different(chains: Collection[SerialChain]) -> list[SerialChain]:
+    """The limbs of one file without those that have the same axes and tip, as hands' many fingers have."""
+    keys = (np.round([[*s.s, *(s.s0 - chain.tip.p)] for s in chain.screws], 6).tobytes() for chain in chains)
+    return list(dict(zip(keys, chains, strict=True)).values())
+
+
 @pytest.mark.robots
-def test_branches_of_public_robots() -> None:
-    found, missed, seen = 0, 0, set()
-    for chain in chains_of(robots_folder()):
-        key = np.round([[*s.s, *(s.s0 - chain.tip.p)] for s in chain.screws], 6).tobytes()
-        if key not in seen:
-            seen.add(key)
-            counts = compared(chain, 5)
-            found, missed = found + counts[0], missed + counts[1]
-    assert found > 100
-    print(f"{found + missed} branches of {len(seen)} limbs, {missed} missed")  # shown by -s
-    assert not missed
-
-
-def robots_folder() -> Path:
-    given = os.environ.get("SCREWKIN_ROBOTS")
-    if given:
-        return Path(given)
-    data = pytest.importorskip("example_robot_data")
-    return Path(data.__file__).parents[4] / "share" / "example-robot-data" / "robots"
+@pytest.mark.parametrize("file", robot_files(), ids=lambda file: file.name)
+def test_branches_of_public_robots(file: Path) -> None:
+    """All limbs and arms of a file; ``-s`` shows how many branches were compared."""
+    chains = different(list(chains_of(file)))
+    counts = {chain.limb: compared(chain, 5) for chain in chains}
+    found, missed = np.sum([*counts.values(), (0, 0)], axis=0)
+    print(f"{file.name}: {found + missed} branches of {len(chains)} limbs, {missed} missed")
+    assert not missed, {limb: both for limb, both in counts.items() if both[1]}
