@@ -8,7 +8,6 @@ dropped silently. XML with entities or external references is refused.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -29,7 +28,7 @@ from screwkin.model.inertias import (
     united,
     without_noise,
 )
-from screwkin.model.records import Box, CoupledJoint, Frame, Inertia, Joint, Link, RobotRecord, Shape
+from screwkin.model.records import FLOOR, Box, CoupledJoint, Frame, Inertia, Joint, Link, RobotRecord, Shape
 from screwkin.model.robot import Robot
 from screwkin.model.shapes import box_points, shape_points
 from screwkin.model.srdf import find_srdf, read_srdf, with_srdf
@@ -46,6 +45,7 @@ from screwkin.model.urdf_xml import (
     base_of,
     from_root,
     named,
+    plain_name,
     read_joints,
     read_root,
 )
@@ -55,7 +55,6 @@ _KEPT = {
     "robot": {"link", "joint", "material", "mujoco"},
     "joint": {"origin", "parent", "child", "axis", "limit", "mimic"},
 }
-_NO_NAME = re.compile(r"[^A-Za-z0-9_-]+")
 _IMPOSSIBLE = "inertia read as it stands, though no body has it (to repair: convert --repair)"
 _REPAIRED = "inertia that no body has, replaced by the nearest that one can have"
 
@@ -131,7 +130,7 @@ def parse_urdf(
     rows = [_joint(reader, edge, bodies[edge.parent], bodies[edge.child]) for edge in moving]
     leaders = [row for edge, row in zip(moving, rows, strict=True) if edge.name not in couplings]
     followers = [
-        coupled_joint(row, (_name(couplings[edge.name][0]), *couplings[edge.name][1:]))
+        coupled_joint(row, (plain_name(couplings[edge.name][0]), *couplings[edge.name][1:]))
         for edge, row in zip(moving, rows, strict=True)
         if edge.name in couplings
     ]
@@ -140,7 +139,7 @@ def parse_urdf(
     _audit_bodies(reader, whole, parts, base, names)
     repaired = ", with repaired inertias" if _REPAIRED in reader.notes else ""
     robot = RobotRecord(
-        name=_name(root.get("name", "") or "robot"),
+        name=plain_name(root.get("name", "") or "robot"),
         description="",
         source=f"URDF {Path(path).name}{repaired}",
         base="fixed" if base == "world" and free is None else "floating",
@@ -244,11 +243,11 @@ def _bodies(base: str, joints: Sequence[Edge], names: Mapping[str, str]) -> dict
 
 
 def _unique_names(reader: Reader, links: Iterable[str], base: str) -> dict[str, str]:
-    """Names that a table allows, one for each link; only the base link may be called ``base``."""
+    """Names that a table allows, one for each link: ``base`` for the base link only, ``floor`` for none."""
     names: dict[str, str] = {}
-    taken = {"base"} - {base}
+    taken = {"base", FLOOR} - ({base} - {FLOOR})
     for link in links:
-        name = _name(link)
+        name = plain_name(link)
         while name in taken:
             name += "_"
         if name != link:
@@ -256,11 +255,6 @@ def _unique_names(reader: Reader, links: Iterable[str], base: str) -> dict[str, 
         taken.add(name)
         names[link] = name
     return names
-
-
-def _name(text: str) -> str:
-    name = _NO_NAME.sub("_", text)
-    return name if name[:1].isalpha() or name[:1] == "_" else f"_{name}"
 
 
 def _add_mass(reader: Reader, body: _Body, name: str, link: Element, repair: bool) -> None:
@@ -322,7 +316,7 @@ def _joint(reader: Reader, edge: Edge, parent: _Body, child: _Body) -> Joint:
         child.frame.p,
         INFINITE if kind == "prismatic" else 0,
     )
-    return Joint(_name(edge.name), parent.name, child.name, kind, screw, lower, upper, *greatest)
+    return Joint(plain_name(edge.name), parent.name, child.name, kind, screw, lower, upper, *greatest)
 
 
 def _within_reach(

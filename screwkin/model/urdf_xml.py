@@ -18,6 +18,7 @@ from screwkin.model.records import JointType
 Element = Any
 
 _DECLARATION = re.compile(r"<\?xml\s[^<>]*\?>")
+_NO_NAME = re.compile(r"[^A-Za-z0-9_-]+")
 _FIX = "Give a URDF file: XML with <robot> around <link> and <joint>"
 _FOREIGN: Mapping[str, str] = {
     "sdf": "This is SDF, of Gazebo: give the URDF that it was made from, or run sdformat_urdf (of ROS 2)",
@@ -149,6 +150,12 @@ def named(reader: Reader, root: Element, tag: str) -> Iterator[tuple[str, Elemen
         else:
             seen.add(name)
             yield name, element
+
+
+def plain_name(text: str) -> str:
+    """A name as a table writes it: of letters, digits, - and _."""
+    name = _NO_NAME.sub("_", text)
+    return name if name[:1].isalpha() or name[:1] == "_" else f"_{name}"
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,8 @@ def configuration(model: pin.Model, positions: dict[str, float]) -> np.ndarray:
 def plain(name: str) -> str:
     """A name as a table writes it."""
     name = re.sub(r"[^A-Za-z0-9_-]+", "_", name)
+    if name == "floor":  # what robots stand on
+        return "floor_"
     return name if name[:1].isalpha() or name[:1] == "_" else f"_{name}"
 
 

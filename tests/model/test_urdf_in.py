@@ -358,3 +358,9 @@ def test_an_inertia_that_does_not_fit_into_its_link_is_a_remark(solid, remark):
     text = ARM.replace("</link>", shape, 1).replace('"0.02"', '"2"')
     found = [one for one in parse_urdf(text).remarks if one.startswith("radius of gyration")]
     assert [one.startswith(remark) for one in found] == ([True] if remark else [])
+
+
+def test_a_link_with_the_name_of_the_floor_gets_another_one():
+    read = parse_urdf(ARM.replace('"base"', '"floor"'))
+    assert read.robot.base_link == "floor_"
+    assert any("'floor' to floor_" in remark for remark in read.remarks)
