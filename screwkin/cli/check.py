@@ -16,6 +16,7 @@ from screwkin.model.toml import read_text
 from screwkin.model.urdf_xml import links_without_inertia
 
 _NO = 3
+_COUNTED = {"error": "errors", "warning": "warnings", "info": "remarks"}
 _ADVICE = "screwkin new writes the table with it, to be edited"
 
 
@@ -33,7 +34,7 @@ def check(robot: RobotName, as_json: AsJson = False) -> int:
     else:
         for remark in remarks:
             say(str(remark))
-        say(f"{table.name}: " + ", ".join(f"{count} of level {level}" for level, count in counts.items()))
+        say(f"{table.name}: " + ", ".join(f"{counts[level]} {word}" for level, word in _COUNTED.items()))
     return _NO if counts["error"] else 0
 
 

@@ -65,7 +65,7 @@ def doctor(
     else:
         rows = _rows(facts)
         if report:
-            print(_report(rows, facts["advice"]))
+            say(_report(rows, facts["advice"]), folds=False)
         else:
             say("\n".join([aligned(rows), *(f"  {text}" for text in facts["advice"])]))
     return 0 if facts["ready"] else 3

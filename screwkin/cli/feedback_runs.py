@@ -11,7 +11,7 @@ from screwkin.campaign.feedback_bound import BOUND, LEAST_RUNS, feedback_bound
 from screwkin.campaign.plan import seeds_from
 from screwkin.campaign.statistics import wilson
 from screwkin.campaign.world import check_world
-from screwkin.cli.output import print_json, progress_bar
+from screwkin.cli.output import print_json, progress_bar, say
 from screwkin.cli.simulation import engine as engine_named
 from screwkin.errors import InputError
 from screwkin.files import atomic_write
@@ -54,12 +54,12 @@ def feedback_runs(
     if as_json:
         print_json(asdict(bound) | {"runs": runs, "interval": [low, high], "bound": bound.deviation[far]})
     else:
-        print(
+        say(
             f"{path}: {robot.name} on {bound.servo} in {chosen}, worlds {worlds}\n"
             f"{bound.falls} of {runs} runs fell ({100 * low:.1f} to {100 * high:.1f} %); "
             f"a joint came at most {bound.deviation[far]:.3f} rad from its plan ({far})\n"
             f"written: {beside}"
         )
         if runs < LEAST_RUNS:
-            print(f"send --feedback asks for {LEAST_RUNS} runs at least")
+            say(f"send --feedback asks for {LEAST_RUNS} runs at least")
     return 0 if bound.falls == 0 and runs >= LEAST_RUNS else 3

@@ -88,10 +88,15 @@ def silent(text: str) -> None:
     """Nothing: for those who asked for JSON alone."""
 
 
-def say(text: str) -> None:
-    """A result for the reader, on stdout: folded where the terminal is narrower; nothing if --quiet."""
+def say(text: str, folds: bool = True) -> None:
+    """A result for the reader, on stdout; nothing if --quiet.
+
+    Args:
+        text: lines of it.
+        folds: whether it is folded where the terminal is narrower; not what goes into another document.
+    """
     if not manners().quiet:
-        print(folded(text, sys.stdout), flush=True)
+        print(folded(text, sys.stdout) if folds else text, flush=True)
 
 
 def aligned(rows: Sequence[Sequence[Any]], indent: str = "") -> str:

@@ -41,7 +41,7 @@ def table(
         header, rows = screw_cells(loaded)
         say("\n\n".join([aligned([header, *rows]), *derived]))
     else:
-        print("\n\n".join([screw_table(loaded, style), *derived]))
+        say("\n\n".join([screw_table(loaded, style), *derived]), folds=False)
     return 0
 
 

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from screwkin.cli.options import AsJson
-from screwkin.cli.output import print_json, progress_bar
+from screwkin.cli.output import print_json, progress_bar, say
 from screwkin.errors import InputError
 from screwkin.gait.files import default_gait, load_gait
 from screwkin.gait.record import Gait, gait_from_dict
@@ -59,7 +59,7 @@ def view(
         if as_json:
             print_json({"url": url, "robot": session.robot.name})
         else:
-            print(f"{session.robot.name}: {url} (Ctrl-C ends it)")
+            say(f"{session.robot.name}: {url} (Ctrl-C ends it)")
         sys.stdout.flush()
 
     serve(session, host, port, ready)
@@ -112,5 +112,5 @@ def _filmed(session: Session, what: str, film: Path, as_json: bool) -> int:
     if as_json:
         print_json({"url": None, "robot": session.robot.name, "film": str(path)})
     else:
-        print(f"{session.robot.name}: the film is {path}")
+        say(f"{session.robot.name}: the film is {path}")
     return 0

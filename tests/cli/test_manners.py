@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import re
 import sys
+from pathlib import Path
 
 import pytest
 import typer
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from screwkin.cli import OPTIONS, VERBS, run, verb_app
+from screwkin.cli import OPTIONS, VERBS, completion, run, verb_app
 from screwkin.cli.completers import VALUES
 from screwkin.cli.output import progress_bar, remark, say
 from screwkin.cli.terminal import GAP, Manners, folded, manners, table_lines, with_manners
@@ -240,3 +241,11 @@ def test_a_shell_that_is_not_known_is_refused(cli, refused):
 
 def test_help_names_every_option_of_all_verbs(cli):
     assert all(f"  {option}" in cli("--help").out for option in OPTIONS)
+
+
+def test_results_go_through_one_function_that_quiet_silences():
+    """All but shell scripts, the version and errors; so a verb that is added is quiet too."""
+    folder = Path(completion.__file__).parent
+    texts = {path.name: path.read_text(encoding="utf-8") for path in folder.glob("*.py")}
+    printing = {name for name, text in texts.items() if re.search(r"(?<![\w.])print\(", text)}
+    assert printing == {"__init__.py", "completion.py", "output.py"}
