@@ -40,11 +40,22 @@ nb_merge_streams = True
 
 autodoc_typehints = "none"  # docstrings give shapes and units, which types do not
 autodoc_member_order = "bysource"
+nitpicky = True  # every name that a page refers to is on a page
+nitpick_ignore_regex = [
+    ("py:class", r"(numpy|screwkin)\..*")
+]  # types of signatures: not every one has a page
+napoleon_use_rtype = False  # what stands before a colon in Returns is a shape, no class
 
 
 def absolute_values(app, what, name, obj, options, lines) -> None:
     """Bars of docstrings are absolute values, not substitutions."""
     lines[:] = [line.replace("|", r"\|") for line in lines]
+
+
+def whole_sentences(app, what, name, obj, options, lines) -> None:
+    """What stands before a colon in the first line of a property is no type."""
+    if what in ("property", "attribute"):
+        lines[:0] = ["..", ""]  # an empty comment
 
 
 def links_out_of_the_site(app, name, source) -> None:
@@ -57,4 +68,5 @@ def setup(app) -> None:
     """Write the pages of reference from the code before Sphinx reads the folder."""
     references.write_all(HERE / "reference")
     app.connect("source-read", links_out_of_the_site)
+    app.connect("autodoc-process-docstring", whole_sentences, priority=400)  # before napoleon reads it
     app.connect("autodoc-process-docstring", absolute_values)

@@ -12,6 +12,7 @@ import gallery  # beside this file
 import typer
 
 import screwkin as sk
+from screwkin import errors
 from screwkin.analysis.verdict import Criteria, Measured, Verdict
 from screwkin.cli import OPTIONS, VERBS, verb_app
 from screwkin.files import atomic_write
@@ -36,6 +37,9 @@ CHANNELS_BEGIN = """\
 Key points: `at` in steps, and the `value` there. A gait of kind `geometric` needs all channels, others
 the two of the feet. `swing` holds for the swinging foot only, `advance` gains one a step, `alternate`
 changes its sign with every step, `repeat` does not."""
+ERRORS_BEGIN = """\
+All that is raised on purpose is a `screwkin.ScrewkinError`; the classes stand in `screwkin.errors`. Most are
+also the built-in error that one would expect, so `except ValueError` holds for wrong input."""
 COMMANDS_BEGIN = """\
 Exit codes: 0 good; 1 unexpected; 2 bad input or usage; 3 the answer is no; 4 refused for safety; 130
 interrupted. `--json` prints one JSON object and nothing else; `-o DIR` says where files go. Tables and texts
@@ -287,9 +291,24 @@ def functions() -> str:
         "## Functions",
     ]
     parts += [_auto(name, kind) for name, kind in names if kind == "autofunction"]
-    return "\n\n".join(
-        [*parts, "## Records", *(_auto(name, kind) for name, kind in names if kind == "autoclass")]
-    )
+    parts += ["## Records", *(_auto(name, kind) for name, kind in names if kind == "autoclass")]
+    return "\n\n".join([*parts, "## Errors", ERRORS_BEGIN, *map(_raised, raised_classes())])
+
+
+def raised_classes() -> list[type[Exception]]:
+    """The classes of ``screwkin.errors``, in its order: what is raised, and what is warned of."""
+    own = (thing for thing in vars(errors).values() if inspect.isclass(thing))
+    return [thing for thing in own if issubclass(thing, Exception) and thing.__module__ == errors.__name__]
+
+
+def _raised(kind: type[Exception]) -> str:
+    """An error as Sphinx reads it, with what the command line returns for it."""
+    if issubclass(kind, Warning):
+        ends = "A warning; a remark of the command line."
+    else:
+        ends = f"Exit code {getattr(kind, 'exit_code', 1)}."
+    read = f".. autoexception:: {kind.__module__}.{kind.__name__}"
+    return f"### {kind.__name__}\n\n{ends}\n\n```{{eval-rst}}\n{read}\n```"
 
 
 def _auto(name: str, kind: str) -> str:

@@ -96,6 +96,8 @@ def test_every_picture_of_the_gallery_is_there(references: ModuleType) -> None:
 def test_pages_of_names_hold_them_all(references: ModuleType, written: str) -> None:
     page: Callable[[], str] = getattr(references, written)
     expected = (
-        sk.__all__ if written == "functions" else ["trajectory_sha256", "push", "coulomb", "stall_torque"]
+        [*sk.__all__, *(kind.__name__ for kind in references.raised_classes())]
+        if written == "functions"
+        else ["trajectory_sha256", "push", "coulomb", "stall_torque"]
     )
     assert all(name in page() for name in expected)

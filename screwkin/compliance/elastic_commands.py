@@ -95,9 +95,10 @@ def elastic_commands(
         rotations times the size of the robot; where they can in many ways, they move least.
 
     Raises:
-        InputError: a frame is a support, or a point none of the frames. LimitError: a command is beyond a
-        joint's limits. NoSolutionError: there is no equilibrium. SingularError: something moves freely.
-        Others as for ``static_deflection``.
+        InputError: a frame is a support, or a point none of the frames; or as for ``static_deflection``.
+        LimitError: a command is beyond a joint's limits.
+        NoSolutionError: there is no equilibrium.
+        SingularError: something moves freely.
 
     Example:
         >>> import screwkin as sk

@@ -136,9 +136,10 @@ def static_deflection(
         Deflection; its ``converged`` and ``stable`` mark samples that collapse.
 
     Raises:
-        InputError: stiffness, springs or method are wrong, or nothing loads the robot. ShapeError: wrong
-        shape, or NaN. UnknownNameError: no such frame or joint. LimitError: a deflection beyond the end of a
-        spring's table.
+        InputError: stiffness, springs or method are wrong, or nothing loads the robot.
+        ShapeError: wrong shape, or NaN.
+        UnknownNameError: no such frame or joint.
+        LimitError: a deflection beyond the end of a spring's table.
 
     Example:
         >>> import screwkin as sk
