@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from screwkin.analysis.audit import added_by_pybullet, audit
-from screwkin.analysis.remark import LEVELS, Remark
+from screwkin.analysis.remark import LEVELS, Level, Remark
 from screwkin.anatomy.humanoid import anatomy
 from screwkin.cli.options import AsJson, RobotName
 from screwkin.cli.output import print_json, say
@@ -16,7 +16,7 @@ from screwkin.model.toml import read_text
 from screwkin.model.urdf_xml import links_without_inertia
 
 _NO = 3
-_COUNTED = {"error": "errors", "warning": "warnings", "info": "remarks"}
+_COUNTED: dict[Level, str] = {"error": "errors", "warning": "warnings", "info": "remarks"}
 _ADVICE = "screwkin new writes the table with it, to be edited"
 
 
