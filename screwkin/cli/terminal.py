@@ -67,8 +67,8 @@ def folded(text: str, stream: TextIO) -> str:
 
 
 def _folded(line: str, width: int) -> str:
-    if len(line) <= width:
-        return line
+    if len(line) <= width or set(line) in ({"-"}, {"="}):  # a rule under a title is as long as fits
+        return line[:width]
     indent = line[: len(line) - len(line.lstrip())]
     lines = _lines(_tied(line.lstrip()), width - len(indent) - 2, indent, indent + "  ")
     return "\n".join(lines).replace(_TIE, " ")

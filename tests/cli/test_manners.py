@@ -82,6 +82,12 @@ def test_prose_is_folded_further_in_on_terminals_and_where_columns_are_named_onl
     assert " ".join(line.strip() for line in lines) == text.strip()
 
 
+def test_a_rule_under_a_title_ends_with_the_line(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "40")
+    for rule in ("-" * 63, "=" * 41):
+        assert folded(f"title\n{rule}\nrest", Terminal()) == f"title\n{rule[:40]}\nrest"
+
+
 def test_quiet_leaves_no_results_remarks_or_bars(capsys, monkeypatch):
     with with_manners(["walk", "--quiet"]) as words:
         assert words == ["walk"]
