@@ -71,21 +71,18 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         OutputError: the file cannot be created, written or renamed.
     """
     target = Path(path)
-    beside = target.with_name(f".{target.stem}-{secrets.token_hex(4)}{target.suffix}")
-    made = False
+    beside = target.with_name(f".{target.stem}-{secrets.token_hex(8)}{target.suffix}")
     try:
         beside.touch(exist_ok=False)
-        made = True
         yield beside
         beside.replace(target)
-        made = False
     except OSError as error:
         if isinstance(error, ScrewkinError):
             raise
         raise OutputError(f"cannot write {target}: {_because(error)}") from None
-    finally:
-        if made:
-            beside.unlink(missing_ok=True)
+    finally:  # whatever came of it, as an interrupt may come right after any of these lines
+        with suppress(OSError):
+            beside.unlink()
 
 
 @contextmanager

@@ -65,6 +65,25 @@ def check_whole(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("verb", ["convert", "codegen"])
+@pytest.mark.parametrize("step", ["touch", "open"])
+def test_an_interrupt_right_after_a_step_of_writing_a_file_leaves_none(
+    cli, monkeypatch, tmp_path, verb, step
+):
+    whole = getattr(Path, step)
+
+    def interrupted(path, *words, **named):
+        done = whole(path, *words, **named)
+        if path.name.startswith("."):
+            raise KeyboardInterrupt
+        return done
+
+    monkeypatch.setattr(Path, step, interrupted)
+    called = cli(*REACH[verb].split())
+    assert (called.code, called.out) == (130, "")
+    assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize("verb", ["convert", "codegen"])
 def test_an_interrupt_while_a_file_is_written_leaves_none(cli, monkeypatch, tmp_path, verb):
     def interrupted(path, target):
         raise KeyboardInterrupt
