@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import pytest
 import typer
 
@@ -31,6 +32,7 @@ REASONS = {
     r"pytest": "the tests themselves",
     r"ruff|mypy": ".ci/run runs it",
     r"^dask|--cluster": "needs a cluster: tests/campaign/test_cluster.py starts one",
+    r"--port /dev/": "needs servos: tests/cli/test_send_feedback.py and others play to virtual ones",
     r"-m tests\.|-m benchmarks(?! --quick)": "a campaign of minutes to hours, whose results are committed",
 }
 """Lines that are not run, and why."""
@@ -104,12 +106,19 @@ def test_every_reason_is_of_some_line():
 
 
 def prepare(folder: Path) -> None:
-    """What the pages speak of as there: a robot's URDF, a walk, a world."""
+    """What the pages speak of as there: a robot's URDF, a walk, its joints by another program, a world."""
     robot = sk.load_robot("bioloid")
     walk = sk.walk(robot, sk.load_gait("smooth"), 2)
     for place in ("walk", "runs/walk"):
         (folder / place).mkdir(parents=True)
         walk.save(folder / place / "trajectory.npz")
+    np.savetxt(
+        folder / "joints.csv",
+        np.column_stack([walk.time, walk.q]),
+        delimiter=",",
+        header=",".join(["time", *(joint.name for joint in robot.joints)]),
+        comments="",
+    )
     (folder / "world.toml").write_text("[perturbation]\nfriction = 0.7\n", encoding="utf-8")
     for name in ("robot", "my-robot"):
         subprocess.run(

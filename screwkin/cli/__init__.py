@@ -86,12 +86,16 @@ def main(argv: Sequence[str] | None = None) -> NoReturn:
 
 def run(argv: Sequence[str]) -> int:
     """Run the command line and return its exit code: every error ends as one message on stderr."""
-    from screwkin.cli.terminal import with_manners
+    try:
+        from screwkin.cli.terminal import with_manners
 
-    words = [word for word in argv if word != "--debug"]
-    debug = len(words) < len(argv) or bool(os.environ.get("SCREWKIN_DEBUG"))
-    with with_manners(words) as words:
-        return _run(words, debug)
+        words = [word for word in argv if word != "--debug"]
+        debug = len(words) < len(argv) or bool(os.environ.get("SCREWKIN_DEBUG"))
+        with with_manners(words) as words:
+            return _run(words, debug)
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        return _INTERRUPTED
 
 
 def _run(words: Sequence[str], debug: bool) -> int:
@@ -103,9 +107,6 @@ def _run(words: Sequence[str], debug: bool) -> int:
         # The reader has gone (as in ``screwkin table … | head``); nothing may be flushed at exit either.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
-    except KeyboardInterrupt:
-        print("interrupted", file=sys.stderr)
-        return _INTERRUPTED
     except Exception as error:
         if debug:
             import traceback

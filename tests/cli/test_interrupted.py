@@ -103,9 +103,14 @@ def in_child(folder: Path, words: str, after: float | None) -> tuple[int, float]
         os.chdir(folder)
         signal.signal(signal.SIGINT, signal.default_int_handler)
         with open(os.devnull, "w") as nothing, redirect_stdout(nothing), redirect_stderr(nothing):
-            if after is not None:
-                threading.Timer(after, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
-            code = run(words.split())
+            try:
+                if after is not None:
+                    threading.Timer(after, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
+                code = run(words.split())
+            except BaseException as error:  # before it began or after it ended: not the verb's to catch
+                code = 130 if error.__traceback__ is None or error.__traceback__.tb_next is None else 1
+            finally:
+                signal.signal(signal.SIGINT, signal.SIG_IGN)
         os._exit(code)
     _, status = os.waitpid(child, 0)
     return os.waitstatus_to_exitcode(status), time.monotonic() - start

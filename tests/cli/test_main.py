@@ -144,6 +144,17 @@ def test_an_interrupt_ends_cleanly_with_130(cli, monkeypatch):
     assert (called.code, called.out, called.err) == (130, "", "interrupted\n")
 
 
+def test_an_interrupt_before_the_verb_is_known_ends_alike(cli, monkeypatch):
+    import screwkin.cli.terminal
+
+    def interrupted(words):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(screwkin.cli.terminal, "with_manners", interrupted)
+    called = cli("gaits")
+    assert (called.code, called.out, called.err) == (130, "", "interrupted\n")
+
+
 def test_an_interrupt_inside_a_verb_is_no_error_of_ours(cli, monkeypatch):
     import screwkin.cli.gaits
 
