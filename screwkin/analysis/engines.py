@@ -226,8 +226,8 @@ def opened(
     dt = STEP if springs is not None else None
     physics: Physics | MuJoCoPhysics
     if engine == "pybullet":
-        rigid = Physics(sole_stiffness=soles, iterations=sweeps(robot))
-        physics = _refined(rigid, dt, finer, perturbation)
+        wanted = sweeps(robot, rigid=springs is None and not motors)
+        physics = _refined(Physics(sole_stiffness=soles, iterations=wanted), dt, finer, perturbation)
     elif soles is not None:
         raise InputError("engine mujoco has no elastic soles; use pybullet")
     else:

@@ -4,6 +4,8 @@ Such a solver (projected Gauss-Seidel) sees at each contact of a foot only what 
 the foot, as if the joints above it were free. Joints that motors hold make the whole robot resist there, and
 that comes about from sweep to sweep, in as many as the robot is heavier than the corner of a sole feels by
 itself. A robot of 53 kg on feet of .34 kg falls with the sweeps that serve one of 1.7 kg.
+
+Rigid servos want more: with both feet down they close a chain that nothing in it gives way to.
 """
 
 from __future__ import annotations
@@ -25,15 +27,20 @@ SERVED = 250.0
 """How many times heavier than the corner of a sole the robots are that the least number serves."""
 FURTHER = 2.0
 """Sweeps for every time more."""
+RIGID = 2
+"""Times as many with rigid servos. The contact ZMP of the Bioloid's ``step-in-place`` is then .12 mm RMS from
+its plan, not .29; twice as many again take .05 mm off it."""
 
 
-def sweeps(robot: Robot) -> int:
+def sweeps(robot: Robot, rigid: bool = False) -> int:
     """Sweeps per step of a robot: the least number, and more the heavier it is than its soles' corners.
 
     Args:
         robot: of numbers; its feet are judged at its posture ``home``, or else with all joints at zero.
+        rigid: its servos follow their commands exactly.
     """
-    return LEAST + math.ceil(FURTHER * max(0.0, load_ratio(robot) - SERVED))
+    served = LEAST + math.ceil(FURTHER * max(0.0, load_ratio(robot) - SERVED))
+    return RIGID * served if rigid else served
 
 
 def load_ratio(robot: Robot) -> float:

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 import screwkin as sk
+from screwkin.analysis.engines import SimulatedCompliance, opened
 from screwkin.model.inertias import impossible, inertia_matrix
-from screwkin.sim.sweeps import FURTHER, LEAST, SERVED, load_ratio, sweeps
+from screwkin.sim.compliant import Compliance
+from screwkin.sim.sweeps import FURTHER, LEAST, RIGID, SERVED, load_ratio, sweeps
 
 
 def test_the_ratio_is_that_of_pinocchios_mass_matrix():
@@ -53,6 +55,28 @@ def test_a_heavy_robot_on_light_feet_gets_more():
 
 def test_an_arm_gets_the_least_number():
     assert sweeps(sk.load_robot("linkages/four-bar")) == LEAST
+
+
+def test_rigid_servos_get_more_than_springs_and_motors():
+    pytest.importorskip("pybullet")
+    robot = sk.load_robot("bioloid")
+    kinds = {
+        RIGID * LEAST: SimulatedCompliance(),
+        LEAST: SimulatedCompliance(motors="table"),
+        float(LEAST): SimulatedCompliance(servos=Compliance(dict.fromkeys(robot.joint_names, 40.0))),
+    }
+    for wanted, compliance in kinds.items():
+        backend = opened(robot, "pybullet", compliance)
+        assert backend.settings["iterations"] == wanted
+        backend.close()
+
+
+def test_the_contact_zmp_on_rigid_servos_is_that_of_a_plan_whose_accelerations_do_not_jump():
+    """With the sweeps that serve motors it is .28 mm RMS from it."""
+    pytest.importorskip("pybullet")
+    robot = sk.load_robot("bioloid")
+    walk = sk.walk(robot, sk.load_gait("smooth").replace(Tc=1.0), 1)
+    assert sk.validate(robot, walk, "pybullet", servo="rigid").zmp_rms_mm < 0.15
 
 
 def test_pybullet_gives_a_link_with_an_impossible_inertia_the_nearest_one_of_a_body():
