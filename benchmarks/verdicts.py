@@ -27,7 +27,7 @@ WALKS = Path(__file__).parent / "walks.csv"
 ENGINES = ("pybullet", "mujoco")
 SERVOS = ("rigid", "table")
 STEPS = 4
-FOLLOWING = ("walk", "smooth", "preview", "poppy12-preview")
+FOLLOWING = ("walk", "smooth", "preview", "paper-poppy12")
 """Gaits whose contact ZMP is expected on the plan on rigid servos, for Tc of at least 1 s."""
 
 

@@ -19,7 +19,7 @@ def robot() -> sk.Robot:
 
 @pytest.fixture(scope="module")
 def gait() -> sk.Gait:
-    return sk.load_gait("poppy12-preview")
+    return sk.load_gait("paper-poppy12")
 
 
 def test_medians_ranges_and_cuts_leave_fallen_runs_out() -> None:
@@ -139,7 +139,7 @@ def test_on_elastic_soles_the_walk_s_own_torques_beat_both_static_remedies(
 
 @pytest.mark.slow
 def test_the_naive_plan_falls_on_elastic_soles_and_the_true_one_stands(robot: sk.Robot) -> None:
-    gait = sk.load_gait("poppy12-preview")
+    gait = sk.load_gait("paper-poppy12")
     fell = {}
     for com in ("waist", "true"):
         backend = PyBulletBackend(robot, Physics(sole_stiffness=2e4))

@@ -17,7 +17,7 @@ from screwkin.model.library import gait_names
 from screwkin.model.robot import Robot
 from screwkin.trajectory import Trajectory
 
-OF_BIOLOID = [name for name in gait_names() if not name.startswith("poppy")]
+OF_BIOLOID = [name for name in gait_names() if "poppy" not in name]
 
 
 @pytest.fixture(scope="module")

@@ -28,7 +28,7 @@ def robot() -> sk.Robot:
 
 @pytest.fixture(scope="module")
 def walked(robot: sk.Robot) -> sk.Trajectory:
-    return sk.walk(robot, sk.load_gait("poppy12-preview"), steps=2)
+    return sk.walk(robot, sk.load_gait("paper-poppy12"), steps=2)
 
 
 def stances(walked: sk.Trajectory) -> list[tuple[str, str, np.ndarray]]:

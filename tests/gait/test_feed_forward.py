@@ -21,7 +21,7 @@ def robot() -> sk.Robot:
 
 @pytest.fixture(scope="module")
 def walked(robot: sk.Robot) -> sk.Trajectory:
-    return sk.walk(robot, sk.load_gait("poppy12-preview"), steps=2)
+    return sk.walk(robot, sk.load_gait("paper-poppy12"), steps=2)
 
 
 def test_the_joints_work_is_the_change_of_energy(robot: sk.Robot, walked: sk.Trajectory) -> None:

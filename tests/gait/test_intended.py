@@ -13,7 +13,7 @@ from screwkin.gait.compensation import WAYS, compensate_walk
 from screwkin.gait.intended import intended
 
 
-@pytest.mark.parametrize(("robot", "gait"), [("poppy12", "poppy12-preview"), ("bioloid", "walk")])
+@pytest.mark.parametrize(("robot", "gait"), [("poppy12", "paper-poppy12"), ("bioloid", "walk")])
 @pytest.mark.parametrize("way", WAYS)
 def test_what_compensation_did_to_the_joints_is_undone(robot: str, gait: str, way: str) -> None:
     table = sk.load_robot(robot)
@@ -29,13 +29,13 @@ def test_what_compensation_did_to_the_joints_is_undone(robot: str, gait: str, wa
 
 def test_a_trajectory_without_compensation_is_its_own_motion() -> None:
     table = sk.load_robot("poppy12")
-    walked = sk.walk(table, sk.load_gait("poppy12-preview"), steps=1)
+    walked = sk.walk(table, sk.load_gait("paper-poppy12"), steps=1)
     assert intended(table, walked) is walked
 
 
 def test_poses_out_of_reach_are_told() -> None:
     table = sk.load_robot("poppy12")
-    walked = sk.walk(table, sk.load_gait("poppy12-preview"), steps=1)
+    walked = sk.walk(table, sk.load_gait("paper-poppy12"), steps=1)
     base = walked.T_world_base.copy()
     base[10:, 2, 3] += 0.1
     claimed = replace(walked, T_world_base=base, meta={**walked.meta, "compensation": {}})

@@ -23,7 +23,7 @@ def robot() -> sk.Robot:
 
 @pytest.fixture(scope="module")
 def gait() -> sk.Gait:
-    return sk.load_gait("poppy12-preview")
+    return sk.load_gait("paper-poppy12")
 
 
 @pytest.fixture(scope="module")
@@ -157,3 +157,9 @@ def test_steps_must_be_whole_and_a_preview_gait_is_not_made_of_key_points(
         sk.walk(robot, gait, steps=0)
     with pytest.raises(GaitError, match="preview"):
         plan(gait, stance_of(robot), 2)
+
+
+@pytest.mark.parametrize(("robot_name", "name"), [("bioloid", "preview"), ("poppy12", "poppy12-preview")])
+def test_the_zmp_of_preview_walks_stays_well_inside_the_soles(robot_name: str, name: str) -> None:
+    robot = sk.load_robot(robot_name)
+    assert sk.zmp(robot, sk.walk(robot, sk.load_gait(name))).margin.min() > 0.020

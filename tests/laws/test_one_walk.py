@@ -16,7 +16,7 @@ import pytest
 import screwkin as sk
 from screwkin.model.library import gait_names
 
-ROBOTS = {"poppy12-preview": "poppy12"}
+ROBOTS = {"poppy12-preview": "poppy12", "paper-poppy12": "poppy12"}
 FEW = [("walk", 10), ("walk", 80), ("preview", 25), ("poppy12-preview", 20)]
 """Gaits and rates [1/s]: fewer samples than a program takes one by one, and more."""
 QUICK = {"auto"}

@@ -39,7 +39,7 @@ def test_differences_from_another_robot_have_its_size_taken_off(bench: Bench) ->
 
 def test_the_swing_foots_correction_is_told_by_swings(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     """A correction of 2 mm in the first swing of a foot, 5 mm in later ones, none while it stands."""
-    walk = bench.account("poppy12-preview", None, {"steps": 7}).trajectory
+    walk = bench.account("paper-poppy12", None, {"steps": 7}).trajectory
     other = SimpleNamespace(robot=bench.robot, account=lambda gait: SimpleNamespace(trajectory=walk))
     foot = bench.robot.limb("left_leg").tip
     flying = ~walk.contact[:, walk.feet.index(foot)]
@@ -69,7 +69,7 @@ def test_the_most_changed_commands_are_named_from_the_waist_down(
 
 
 def test_landings_are_timed_against_the_plan(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
-    walk = bench.account("poppy12-preview").trajectory
+    walk = bench.account("paper-poppy12").trajectory
     at = landings(walk)
     time = np.linspace(0, walk.duration, 400)
     wanted = np.zeros((400, 2))
@@ -79,11 +79,11 @@ def test_landings_are_timed_against_the_plan(bench: Bench, monkeypatch: pytest.M
     record = ZmpRecord(time, zmp, wanted, wanted)
     trial = Trial("none", 1.0, 5e-4, None, (20.0, 20.0), record, (0.02, 0.03, 0.04))
     monkeypatch.setattr(measures_springs, "trial_of", lambda *_: trial)
-    assert landing(bench, "poppy12-preview", "none", "lead", 100.0) == pytest.approx(0.03)
-    assert landing(bench, "poppy12-preview", "none", "order", 100.0) == "before"
-    assert landing(bench, "poppy12-preview", "none", "peak", 100.0) == pytest.approx(time[worst] - at[1])
+    assert landing(bench, "paper-poppy12", "none", "lead", 100.0) == pytest.approx(0.03)
+    assert landing(bench, "paper-poppy12", "none", "order", 100.0) == "before"
+    assert landing(bench, "paper-poppy12", "none", "peak", 100.0) == pytest.approx(time[worst] - at[1])
     monkeypatch.setattr(
         measures_springs, "trial_of", lambda *_: Trial("none", 1.0, 5e-4, 0.1, (1.0, 1.0), record)
     )
     with pytest.raises(InputError, match="no landings"):
-        landing(bench, "poppy12-preview", "none", "lead", 100.0)
+        landing(bench, "paper-poppy12", "none", "lead", 100.0)

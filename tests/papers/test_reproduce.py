@@ -222,8 +222,8 @@ def test_a_paper_changes_its_gaits_before_anything_else_does():
 def test_figures_of_a_walk_on_springs_show_every_treatment_and_who_falls():
     """Drawn from made-up runs: the ZMP wanted, 10 mm aside; none of the text depends on a simulation."""
     bench = Bench("poppy12", {"steps": 2})
-    account = bench.account("poppy12-preview")
-    wanted = zmp_lines(bench, "poppy12-preview")[0]
+    account = bench.account("paper-poppy12")
+    wanted = zmp_lines(bench, "paper-poppy12")[0]
     record = ZmpRecord(account.trajectory.time, wanted + 0.01, wanted, wanted)
     trials = [
         Trial("none", 0.8, 5e-4, None, (10.0, 10.0)),
@@ -231,7 +231,7 @@ def test_figures_of_a_walk_on_springs_show_every_treatment_and_who_falls():
         Trial("swing", 1.0, 5e-4, None, (10.0, 10.0), record),
     ]
     bench.once(("springs", account.trajectory.sha256, 100.0, *FRICTIONS), lambda: summarised(trials))
-    told = {"gait": "poppy12-preview", "treatments": ["none", "swing"], "stiffness": 100.0}
+    told = {"gait": "paper-poppy12", "treatments": ["none", "swing"], "stiffness": 100.0}
     for draw in ("sprung_zmp", "sprung_zmp_above"):
         with styled():
             figure = DRAWINGS[draw](bench, **told)

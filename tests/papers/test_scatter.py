@@ -107,9 +107,9 @@ def test_runs_on_springs_have_their_median_over_those_that_stand():
     trials = [
         Trial("none", 1.0, 5e-4, at, (x, 2.0 * x)) for x, at in ((10.0, None), (30.0, None), (99.0, 1.0))
     ]
-    sha256 = bench.account("poppy12-preview").trajectory.sha256
+    sha256 = bench.account("paper-poppy12").trajectory.sha256
     bench.once(("springs", sha256, 100.0, *FRICTIONS), lambda: summarised(trials))
-    asked = {"gait": "poppy12-preview", "treatment": "none", "stiffness": 100.0}
+    asked = {"gait": "paper-poppy12", "treatment": "none", "stiffness": 100.0}
     error = MEASURES["on_springs"](bench, key="y", **asked)
     assert error == Scatter((pytest.approx(0.02), pytest.approx(0.06)))
     assert MEASURES["on_springs"](bench, key="fallen", **asked) == "1 of 3"
