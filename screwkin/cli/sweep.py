@@ -38,11 +38,12 @@ from screwkin.cli.options import AsJson, FittingGait, GaitName, OutputFolder, Ro
 from screwkin.cli.output import aligned, drawn, print_json, progress_bar, remark, say
 from screwkin.cli.simulation import engine as engine_named
 from screwkin.cli.sweep_optimise import bounds_of, optimise
-from screwkin.cli.walk import limbed
+from screwkin.cli.walk import limbed, stepping_gait
 from screwkin.errors import GaitError, InputError, near, one_of
 from screwkin.files import atomic_write, atomic_write_bytes, npz_bytes, versions
 from screwkin.gait.files import default_gait, load_gait
 from screwkin.gait.fitting import fitting_gait
+from screwkin.gait.listed import Footsteps, load_footsteps, with_footsteps
 from screwkin.gait.record import Gait
 from screwkin.model.robot import Robot, robot_text
 from screwkin.model.table import load_robot
@@ -57,6 +58,10 @@ def sweep(
     robot: RobotName,
     gait: GaitName = None,
     auto: FittingGait = False,
+    list_of_steps: Annotated[
+        Path | None,
+        typer.Option("--footsteps", metavar="FILE", help="As of walk: every row walks over these footholds."),
+    ] = None,
     assignments: Annotated[
         list[str] | None,
         typer.Option(
@@ -127,14 +132,15 @@ def sweep(
     axes = _axes(
         fixed,
         {
-            "gait": AUTO if auto else gait or default_gait(table.name),
+            "gait": AUTO if auto else gait or (stepping_gait if list_of_steps else default_gait)(table.name),
             "engine": engine or ("kinematic" if objective == "margin" else "auto"),
             "servo": servo,
             "feedback": ON if feedback else OFF,
             "perturb": " ".join(perturb) if perturb else AS_PLANNED,
         },
     )
-    campaign = _campaign(table, axes, _seeds(seeds, seed or 0, 1 if runs is None else runs))
+    places = None if list_of_steps is None else load_footsteps(list_of_steps)
+    campaign = _campaign(table, axes, _seeds(seeds, seed or 0, 1 if runs is None else runs), places)
     if jobs is not None and jobs < 1:
         raise InputError(f"--jobs {jobs}: at least one process plays the rows")
     if objective:
@@ -187,7 +193,7 @@ def _axes(assignments: Sequence[str], defaults: Mapping[str, str]) -> Axes:
     return {key: (text,) for key, text in defaults.items()} | given
 
 
-def _campaign(robot: Robot, axes: Axes, seeds: tuple[int, ...]) -> Campaign:
+def _campaign(robot: Robot, axes: Axes, seeds: tuple[int, ...], places: Footsteps | None) -> Campaign:
     """The plan, with every setting checked before anything is played.
 
     Raises:
@@ -207,7 +213,7 @@ def _campaign(robot: Robot, axes: Axes, seeds: tuple[int, ...]) -> Campaign:
             raise InputError(
                 f"--perturb {text}: engine kinematic has no forces to perturb; use mujoco or pybullet"
             )
-    gaits = {name: json.dumps(_gait(robot, name).to_dict()) for name in axes["gait"]}
+    gaits = {name: json.dumps(_gait(robot, name, places).to_dict()) for name in axes["gait"]}
     campaign = Campaign(robot_text(robot), gaits, axes, seeds, versions(*VERSIONED))
     for values in campaign.settings:
         try:
@@ -218,8 +224,9 @@ def _campaign(robot: Robot, axes: Axes, seeds: tuple[int, ...]) -> Campaign:
     return campaign
 
 
-def _gait(robot: Robot, name: str) -> Gait:
-    return fitting_gait(robot) if name == AUTO else load_gait(name)
+def _gait(robot: Robot, name: str, places: Footsteps | None) -> Gait:
+    gait = fitting_gait(robot) if name == AUTO else load_gait(name)
+    return gait if places is None else with_footsteps(gait, places)
 
 
 def _workers(jobs: int, address: str | None) -> AbstractContextManager[Workers]:

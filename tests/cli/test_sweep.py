@@ -40,6 +40,30 @@ def test_a_campaign_leaves_its_rows_and_what_has_ended_is_not_played_again(cli, 
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
 
+PLACES = [(0.03, -0.04, 0.0), (0.05, 0.04, 0.1), (0.05, -0.04, 0.1)]
+
+
+def test_a_list_of_footsteps_is_swept(cli, tmp_path):
+    rows = ["x,y,yaw", *(",".join(map(str, place)) for place in PLACES)]
+    (tmp_path / "places.csv").write_text("\n".join(rows))
+    words = ("--footsteps", "places.csv", "--set", "rate=20", "--set", "lift=0.02,0.03")
+    swept = cli("sweep", "bioloid", *words, "--engine", "kinematic", "--no-plots", "-o", "c", "--json")
+    assert swept.code == 0, swept.err
+    assert (swept.data["planned"], swept.data["crashed"], swept.data["refused"]) == (2, 0, 0)
+    with (tmp_path / "c" / "rows.csv").open(newline="") as file:
+        margins = {row["lift"]: float(row["margin_mm"]) for row in csv.DictReader(file)}
+    robot, gait = sk.load_robot("bioloid"), sk.load_gait("auto").replace(rate=20, lift=0.02)
+    margin = sk.zmp(robot, sk.walk(robot, gait, sk.footsteps(PLACES))).margin.min()
+    assert margins["0.02"] == pytest.approx(1e3 * margin, abs=1e-3)
+
+
+def test_a_list_of_footsteps_needs_a_gait_that_follows_its_feet(cli, tmp_path, refused):
+    (tmp_path / "places.csv").write_text("x,y,yaw\n0.03,-0.04,0\n")
+    message = refused(cli("sweep", "bioloid", "--gait", "walk", "--footsteps", "places.csv", "-o", "c"), 2)
+    assert "'geometric' moves its waist by key points" in message
+    assert not (tmp_path / "c").exists()
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
