@@ -20,7 +20,7 @@ from screwkin.gait.keypoints import CHANNELS
 from screwkin.gait.keys import KEYS
 from screwkin.gait.preview_plan import SETTINGS
 from screwkin.gait.relative import NOMINAL
-from screwkin.model import schema
+from screwkin.model import schema, servo_section
 from screwkin.motors.records import Friction, Motor, MotorModel
 from screwkin.servo import model_file, servo_map
 from screwkin.sim.perturbation import Perturbation
@@ -137,7 +137,7 @@ def robot_tables() -> str:
     parts += [
         "## [servos]",
         _doc(servo_map),
-        "Keys: " + _listed(servo_map.KEYS),
+        "Keys: " + _listed(servo_section.KEYS),
     ]
     return "\n\n".join(parts)
 

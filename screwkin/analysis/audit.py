@@ -1,4 +1,4 @@
-"""An audit of a robot: masses, inertias, limits, axes, symmetry, soles, loops, what simulators do.
+"""An audit of a robot: masses, inertias, limits, axes, symmetry, soles, loops, servos, what simulators do.
 
 Nothing is mended here: every remark says where, what and what to do about it.
 """
@@ -13,6 +13,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array
 from screwkin.analysis.audit_body import body_remarks
+from screwkin.analysis.audit_servos import servo_remarks
 from screwkin.analysis.remark import LEVELS, Level, Remark
 from screwkin.errors import expect
 from screwkin.model.inertias import impossible, inertia_matrix
@@ -52,6 +53,7 @@ def audit(robot: Robot) -> tuple[Remark, ...]:
             for text in seen.remarks
         ),
         *body_remarks(robot),
+        *servo_remarks(robot),
     ]
     return tuple(sorted(remarks, key=lambda remark: LEVELS.index(remark.level)))
 

@@ -12,7 +12,7 @@ from screwkin.dynamics.terrain import FLAT, Terrain
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.gait.compensation import WAYS, compensate_walk, stiffness_of, way_of
 from screwkin.model.robot import Robot
-from screwkin.motors.library import motors_named, motors_of, names_motors
+from screwkin.motors.library import model_of_every_joint, motors_named, motors_of, names_motors
 from screwkin.motors.records import Motor
 from screwkin.sim.backend import Backend
 from screwkin.sim.compliant import STEP, Compliance, SpringServos
@@ -136,12 +136,42 @@ def servo_for(
 
     It is ``table`` where the robot's table names the models of all servos, and commands can allow for them in
     the trajectory. It is ``rigid`` besides springs, and where no forces are simulated.
+
+    Raises:
+        UnknownNameError, TableError: the file of a model that the table names is missing, or has faults.
     """
     if servo != AUTO:
         return servo
     chosen = compliance or SimulatedCompliance()
     free = chosen.servos is None and chosen.motors is None and engine != "kinematic"
     return TABLE if free and names_motors(robot) and _allows(robot, trajectory) else RIGID
+
+
+def servos_in_words(
+    servo: str | Path, robot: Robot, trajectory: Trajectory, engine: Engine, compliance: SimulatedCompliance
+) -> tuple[str, str]:
+    """Which servos a simulation has, and why.
+
+    Args:
+        servo: as it was asked for.
+        robot: of the trajectory.
+        trajectory: what is simulated.
+        engine: as it was asked for.
+        compliance: as it was asked for.
+    """
+    chosen, asked = servo_for(servo, robot, trajectory, engine, compliance), f"--servo {servo}"
+    if compliance.servos is not None:
+        return "springs", "--compliant"
+    if chosen == TABLE:
+        models = dict.fromkeys(model_of_every_joint(robot))
+        return ", ".join(models), "as the table names them" if servo == AUTO else asked
+    if servo != AUTO:
+        return str(servo), asked
+    if engine == "kinematic":
+        return RIGID, "kinematic simulates no forces"
+    if not names_motors(robot):
+        return RIGID, "the table names no servo models whose motors are known"
+    return RIGID, "commands cannot allow for the motors of a robot with loops, or on other than two feet"
 
 
 def simulated_on(servo: str) -> SimulatedCompliance:

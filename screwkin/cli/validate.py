@@ -11,7 +11,7 @@ import typer
 
 from screwkin.analysis.account import account_of, recorded_robot
 from screwkin.analysis.clear_hands import clearing_hand_drop
-from screwkin.analysis.engines import AUTO, SimulatedCompliance, servo_for
+from screwkin.analysis.engines import AUTO, SimulatedCompliance, servo_for, servos_in_words
 from screwkin.analysis.verdict import verdict_of
 from screwkin.campaign.feedback_bound import WORLDS
 from screwkin.cli.feedback_runs import feedback_runs
@@ -23,7 +23,7 @@ from screwkin.cli.simulation import Wish, print_verdict, simulate_to_files
 from screwkin.cli.simulation import engine as engine_named
 from screwkin.errors import InputError, OutputError
 from screwkin.files import make_folder
-from screwkin.report.numbers import validation_numbers
+from screwkin.report.numbers import Number, validation_numbers
 from screwkin.sim.compliant import Compliance
 from screwkin.sim.perturbation_files import described
 from screwkin.trajectory import load_trajectory
@@ -112,6 +112,7 @@ def validate(
     loaded = load_trajectory(trajectory)
     account = account_of(recorded_robot(loaded, str(trajectory)), loaded)
     chosen = servo_for(servo, account.robot, loaded, engine_named(engine), compliance)
+    in_words = servos_in_words(servo, account.robot, loaded, engine_named(engine), compliance)
     compliance.on(chosen).for_trajectory(account.robot, loaded)  # refused before anything is written
     beside = _beside(trajectory)
     words = [
@@ -132,7 +133,9 @@ def validate(
         print_json({"robot": account.robot.name, **verdict_of(account.robot, loaded, check).to_dict()})
     else:
         say(f"{trajectory}: {account.robot.name}, {loaded.duration:.2f} s in {check.engine}")
-        say(aligned(validation_numbers(check), "  "))
+        numbers = validation_numbers(check)
+        numbers.insert(1, Number("servos", *in_words))
+        say(aligned(numbers, "  "))
         print_verdict(check)
         say(f"files in {folder}{'' if folder == beside else f'; validation.json in {beside}'}")
     drop = clearing_hand_drop(account.robot, loaded, check.self_collisions or ())

@@ -14,9 +14,10 @@ from screwkin.model.checks import row_faults
 from screwkin.model.coupled import coupling_text, tightened
 from screwkin.model.expression import listed, resolve_parameters
 from screwkin.model.mesh_files import full_path
-from screwkin.model.mirror import turns_around
+from screwkin.model.mirror import swapped, turns_around
 from screwkin.model.records import LIMIT_TOLERANCE, CoupledJoint, Joint, Link, RobotRecord
 from screwkin.model.rows import Rows, parameters_of, read_rows
+from screwkin.model.servo_section import Mounted, servo_faults
 from screwkin.model.structure import Mirrored, joint_names, mirrored_limbs, structure_faults
 from screwkin.model.toml import read_toml
 
@@ -30,6 +31,7 @@ class CheckedTable:
         rows: all rows, those of mirrored limbs among them.
         mirrored: limbs declared by reflection.
         around: names of the joints whose mirrored position changes sign.
+        joints: names of all joints, mirrored ones among them.
         structural: faults of names and connections.
         faults: all faults, the structural ones among them.
     """
@@ -38,6 +40,7 @@ class CheckedTable:
     rows: Rows
     mirrored: Sequence[Mirrored]
     around: frozenset[str]
+    joints: Sequence[str]
     structural: Sequence[Fault]
     faults: Sequence[Fault]
 
@@ -63,7 +66,7 @@ def checked_table(data: Mapping[str, Any]) -> CheckedTable:
     joints = [tightened(joint, coupled) for joint in joints_of(whole)]
     faults += _range_faults(whole, joints, coupled)
     faults += _posture_faults(rows, joints, coupled, known)
-    return CheckedTable(numbers, whole, mirrored, around, structural, faults)
+    return CheckedTable(numbers, whole, mirrored, around, known, structural, faults)
 
 
 def read_table(text: str, path: str, symbolic: bool = False) -> RobotRecord:
@@ -80,8 +83,8 @@ def read_table(text: str, path: str, symbolic: bool = False) -> RobotRecord:
     """
     data = read_toml(text, path, TableError)
     table = checked_table(data)
-    if table.faults:
-        raise TableError(path, table.faults)
+    if faults := [*table.faults, *_servo_faults(table)]:
+        raise TableError(path, faults)
     names, rows = table.numbers, table.rows
     if symbolic:
         names, _ = resolve_parameters(parameters_of(data), symbolic=True)
@@ -89,6 +92,17 @@ def read_table(text: str, path: str, symbolic: bool = False) -> RobotRecord:
     record = robot_from_rows(rows)
     links = tuple(_with_meshes_of(Path(path).parent, link) for link in record.links)
     return replace(record, links=links, parameters=dict(names), text=text, path=path)
+
+
+def _servo_faults(table: CheckedTable) -> Iterator[Fault]:
+    """Those of ``[servos]``; where names and connections have faults, none that would only echo them."""
+    rows = [row for _, row in table.rows.good("joint")]
+    still = [row.name for row in rows if row.passive or row.mimic is not None]
+    driven = [name for name in table.joints if name not in still]
+    if table.structural:
+        driven += [other for name in driven if (other := swapped(name)) not in table.joints]
+    complete = not (table.structural or table.rows["closure"])
+    return servo_faults(table.rows.servos, Mounted(driven, still, complete))
 
 
 def _with_meshes_of(folder: Path, link: Link) -> Link:

@@ -24,7 +24,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, asdict, fields, replace
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -32,13 +31,11 @@ from typing import Any
 from screwkin.errors import Fault, InputError, TableError, UnknownNameError, near
 from screwkin.files import text_sha256
 from screwkin.model.robot import Robot
-from screwkin.model.toml import read_text, read_toml
+from screwkin.model.servo_models import bundled_tables, is_file, model_table
+from screwkin.model.servo_section import IN_SERVOS
 from screwkin.motors.records import Friction, Motor, MotorModel
 
 POSITIVE = ("constant", "resistance", "voltage", "gain", "kp", "max_duty", "max_current", "speed", "shape")
-IN_SERVOS = {"gain": "kp", "voltage": "voltage", "lag": "lag"}
-"""Keys of ``[servos]`` in a robot's table that stand for figures of all its motors."""
-
 _TOP = ("model", "aliases", "source", "identified", "registers", "motor", "ranges", "sheet", "bus")
 _FIGURES = tuple(f.name for f in fields(Motor) if f.name != "friction")
 _COEFFICIENTS = tuple(f.name for f in fields(Friction))
@@ -62,37 +59,12 @@ def load_motor(name_or_path: str | Path, folder: Path | None = None) -> MotorMod
         UnknownNameError: neither a model nor a file. TableError: every fault of the file.
     """
     name = str(name_or_path).strip()
-    if name.lower().endswith(".toml"):
+    if is_file(name):
         return _model(*model_table(name, folder))
     for model in _bundled():
         if name.lower() in {known.lower() for known in (model.model, *model.aliases)}:
             return model
     raise UnknownNameError("servo model with figures of its motor", name, motor_models())
-
-
-def model_table(path: str, folder: Path | None = None) -> tuple[Mapping[str, Any], str]:
-    """What a user's file of a servo model holds, and where it was.
-
-    Args:
-        path: of the file.
-        folder: where a relative path begins, besides the working folder.
-
-    Raises:
-        UnknownNameError: there is no such file. TableError: it cannot be read, or is no TOML.
-    """
-    name = path.strip()
-    for place in (Path(name), *([folder / name] if folder else [])):
-        if place.is_file():
-            return _toml(read_text(place, TableError), str(place)), str(place)
-    raise UnknownNameError("servo model file", name, motor_models())
-
-
-@cache
-def bundled_tables() -> tuple[tuple[Mapping[str, Any], str], ...]:
-    """What every bundled model's file holds, and its name, in order of the alphabet."""
-    folder = files("screwkin.motors") / "models"
-    names = sorted(entry.name for entry in folder.iterdir() if entry.name.endswith(".toml"))
-    return tuple((_toml((folder / name).read_text("utf-8"), name), name) for name in names)
 
 
 def motors_of(robot: Robot) -> tuple[Motor, ...]:
@@ -102,24 +74,33 @@ def motors_of(robot: Robot) -> tuple[Motor, ...]:
         InputError: the table names no model for a joint. UnknownNameError, TableError: see ``load_motor``.
     """
     return tuple(
-        _with_supply(load_motor(name, table_folder(robot)).motor, robot.servos) for name in _names(robot)
+        _with_supply(load_motor(name, table_folder(robot)).motor, robot.servos)
+        for name in model_of_every_joint(robot)
     )
 
 
 def names_motors(robot: Robot) -> bool:
-    """Whether the table names servo models that all have figures of their motors."""
+    """Whether the table names servo models that all have figures of their motors.
+
+    Raises:
+        UnknownNameError, TableError: a model's file is missing, or has faults.
+    """
     try:
-        return bool(motors_of(robot))
+        names = model_of_every_joint(robot)
     except InputError:
-        return False
+        return False  # it names none for some joint
+    return all(has_motor(name, table_folder(robot)) for name in dict.fromkeys(names))
 
 
 def has_motor(model: str, folder: Path | None = None) -> bool:
-    """Whether a name or a path stands for figures of a motor."""
-    try:
-        return bool(load_motor(model, folder))
-    except InputError:
-        return False
+    """Whether the model of a name or a path has figures of its motor.
+
+    Raises:
+        UnknownNameError, TableError: its file is missing, or has faults.
+    """
+    if is_file(model):
+        return "motor" in model_table(model, folder)[0] and bool(load_motor(model, folder))
+    return any(model.strip().lower() in map(str.lower, (m.model, *m.aliases)) for m in _bundled())
 
 
 def table_folder(robot: Robot) -> Path | None:
@@ -168,8 +149,12 @@ def _bundled() -> tuple[MotorModel, ...]:
     return tuple(_model(table, where) for table, where in bundled_tables() if "motor" in table)
 
 
-def _names(robot: Robot) -> tuple[str, ...]:
-    """The servo model of every joint."""
+def model_of_every_joint(robot: Robot) -> tuple[str, ...]:
+    """The servo model of every joint, in table order, as ``[servos]`` of the robot's table names it.
+
+    Raises:
+        InputError: the table names no model for a joint.
+    """
     models, common = robot.servos.get("models", {}), robot.servos.get("model")
     chosen = {
         name: models.get(name, common) if isinstance(models, Mapping) else common
@@ -195,10 +180,6 @@ def _with_supply(motor: Motor, servos: Mapping[str, Any]) -> Motor:
     if faults:
         raise InputError("; ".join(map(str, faults)))
     return replace(motor, **given)
-
-
-def _toml(text: str, where: str) -> Mapping[str, Any]:
-    return MappingProxyType(read_toml(text, where, TableError))
 
 
 def _model(table: Mapping[str, Any], where: str) -> MotorModel:

@@ -19,7 +19,8 @@ from types import MappingProxyType
 from typing import Any, Literal
 
 from screwkin.errors import InputError, TableError, UnknownNameError
-from screwkin.motors.library import bundled_tables, load_motor, model_table, motor_models
+from screwkin.model.servo_models import bundled_tables, is_file, model_table
+from screwkin.motors.library import load_motor, motor_models
 from screwkin.servo.model_file import Mode, Sign, bus_faults, unit_scale, value_range
 from screwkin.servo.packets import ProtocolName
 
@@ -179,8 +180,7 @@ def load_profile(model: str, folder: Path | None = None) -> Profile:
         UnknownNameError: there is no such model, or only its motor is known; it lists those there are.
         TableError: the faults of the user's file.
     """
-    wanted = model.strip().lower()
-    file = wanted.endswith(".toml")
+    wanted, file = model.strip().lower(), is_file(model)
     if file:
         table, where = model_table(model, folder)
         if isinstance(table.get("registers"), Mapping) or "bus" in table:

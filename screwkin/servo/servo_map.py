@@ -16,18 +16,19 @@ servo angle = direction * joint angle + zero.
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from screwkin.errors import Fault, InputError, TableError, UnknownNameError, near
+from screwkin.errors import Fault, InputError, TableError, UnknownNameError
 from screwkin.files import text_sha256
 from screwkin.mechanism.linkages import motor_joints
 from screwkin.model.robot import Robot
-from screwkin.motors.library import IN_SERVOS, has_motor, table_folder
+from screwkin.model.servo_models import is_model
+from screwkin.model.servo_section import PLACE, Mounted, is_number, servo_faults
+from screwkin.motors.library import table_folder
 from screwkin.servo.packets import ProtocolName
 from screwkin.servo.profiles import (
     Profile,
@@ -38,18 +39,6 @@ from screwkin.servo.profiles import (
     ticks_from_radians,
 )
 
-KEYS = (
-    "model",
-    "models",
-    "protocol",
-    "baud",
-    "ids",
-    "direction",
-    "zero",
-    "range_deg",
-    "stiffness",
-    *IN_SERVOS,
-)
 DEFAULT_BAUD = 1_000_000
 
 
@@ -107,18 +96,7 @@ class ServoMap:
         Raises:
             TableError: every fault of the section at once, each with the key and what would be right.
         """
-        folder, driven = table_folder(robot), motor_joints(robot)
-        passive = [name for name in robot.joint_names if name not in driven]
-        faults, profiles = list(_faults(driven, passive, robot.servos, folder)), {}
-        for joint in driven:
-            try:
-                profiles[joint] = _profile_of(robot.servos, joint, folder)
-            except InputError:
-                continue  # listed among the faults
-        if len(protocols := {profile.protocol for profile in profiles.values()}) > 1:
-            fix = "Servos of one bus speak one protocol: change the models, or their firmware"
-            faults.append(Fault("[servos]", "models", f"speak protocols {sorted(protocols, key=str)}", fix))
-        faults += _line_faults(robot.servos, profiles.values())
+        faults, profiles = _read(robot)
         if faults:
             raise TableError(robot.path or robot.name, faults)
         s = robot.servos
@@ -130,9 +108,10 @@ class ServoMap:
                 float(s.get("zero", {}).get(name, 0.0)),
                 profiles[name],
             )
-            for name in driven
+            for name in profiles
         )
-        return cls(robot.name, protocols.pop(), int(s.get("baud", DEFAULT_BAUD)), joints)
+        protocol = next(iter(profiles.values())).protocol
+        return cls(robot.name, protocol, int(s.get("baud", DEFAULT_BAUD)), joints)
 
     @property
     def ids(self) -> tuple[int, ...]:
@@ -179,75 +158,50 @@ def _profile_of(servos: Mapping[str, Any], joint: str, folder: Path | None) -> P
     model = models.get(joint, servos.get("model")) if isinstance(models, Mapping) else servos.get("model")
     profile = load_profile(str(model), folder)
     degrees: Any = servos.get("range_deg")
-    return replace(profile, range_deg=float(degrees)) if _is_number(degrees) else profile
+    return replace(profile, range_deg=float(degrees)) if is_number(degrees) else profile
 
 
-def _faults(
-    names: tuple[str, ...], passive: Sequence[str], servos: Mapping[str, Any], folder: Path | None
-) -> Iterator[Fault]:
-    """Faults of the section's own keys and values; ``names`` are the joints with motors."""
+def map_faults(robot: Robot) -> list[Fault]:
+    """Every fault that keeps the servos of a robot's table from being played to."""
+    return _read(robot)[0]
+
+
+def _read(robot: Robot) -> tuple[list[Fault], dict[str, Profile]]:
+    """All faults of the section, and the profile of every joint with a motor whose model has one."""
+    servos, folder = robot.servos, table_folder(robot)
     if not servos:
-        yield Fault("[servos]", "", "is missing", "Write at least model and ids there")
-        return
-    for key in servos:
-        if key not in KEYS:
-            yield Fault("[servos]", key, "is unknown", f"{near(key, KEYS)}Known are {', '.join(KEYS)}")
-    models = {key: servos.get(key, default) for key, default in (("models", {}), ("model", None))}
-    named = [("model", models["model"])] if models["model"] is not None or not models["models"] else []
-    if isinstance(models["models"], Mapping):
-        named += [(f"models.{joint}", model) for joint, model in models["models"].items()]
-    for key, model in named:
-        if fault := "is missing" if model is None else _model_fault(model, folder):
-            yield Fault("[servos]", key, fault, f"Known are {', '.join(profile_models())}")
-    for key in ("models", "ids", "direction", "zero"):
-        table = servos.get(key, {})
-        if not isinstance(table, Mapping):
-            fix = f"Write {key} = {{ JOINT = VALUE, … }}"
-            yield Fault("[servos]", key, f"{table!r} is no table", fix)
-        else:
-            yield from (
-                Fault("[servos]", f"{key}.{joint}", *_no_motor(joint, passive, names))
-                for joint in table
-                if joint not in names
-            )
-            yield from _CHECKS[key](names, table)
-    degrees = servos.get("range_deg", 300.0)
-    if not (_is_number(degrees) and 0 < degrees <= 360):
-        yield Fault("[servos]", "range_deg", f"is {degrees!r}", "Write a number of degrees up to 360")
+        return [Fault(PLACE, "", "is missing", "Write at least model and ids there")], {}
+    driven = motor_joints(robot)
+    still = [joint.name for joint in robot.tree if joint.name not in driven]
+    faults = [*servo_faults(servos, Mounted(driven, still)), *_absent(servos, driven)]
+    models = servos.get("models", {})
+    models = models if isinstance(models, Mapping) else {}
+    named = {"model": servos.get("model"), **{f"models.{joint}": model for joint, model in models.items()}}
+    for key, model in named.items():
+        if is_model(model) and (fault := _bus_fault(str(model), folder)):
+            faults.append(Fault(PLACE, key, fault, f"Known are {', '.join(profile_models())}"))
+    profiles = {}
+    for joint in driven:
+        try:
+            profiles[joint] = _profile_of(servos, joint, folder)
+        except InputError:
+            continue  # listed among the faults
+    if len(protocols := {profile.protocol for profile in profiles.values()}) > 1:
+        fix = "Servos of one bus speak one protocol: change the models, or their firmware"
+        faults.append(Fault(PLACE, "models", f"speak protocols {sorted(protocols, key=str)}", fix))
+    return [*faults, *_line_faults(servos, profiles.values())], profiles
 
 
-def _no_motor(joint: str, passive: Sequence[str], names: tuple[str, ...]) -> tuple[str, str]:
-    """What is wrong with a joint that has no motor, and what would be right."""
-    if joint in passive:
-        return "is turned by no motor", f"Joints with motors are {', '.join(names)}"
-    return "is no joint", f"Joints are {', '.join(names)}"
-
-
-def _id_faults(names: tuple[str, ...], ids: Mapping[str, Any]) -> Iterator[Fault]:
-    bearers: dict[Any, list[str]] = {}
-    for joint, number in ids.items():
-        if not (isinstance(number, int) and not isinstance(number, bool) and 0 <= number <= 252):
-            yield Fault("[servos]", f"ids.{joint}", f"is {number!r}", "Write an integer from 0 to 252")
-        else:
-            bearers.setdefault(number, []).append(joint)
-    for number, joints in bearers.items():
-        if len(joints) > 1:
-            what = f"{number} is given to {', '.join(joints)}"
-            yield Fault("[servos]", "ids", what, "Give every servo an id of its own")
-    if missing := [name for name in names if name not in ids]:
-        yield Fault("[servos]", "ids", f"has none for {', '.join(missing)}", "Give every joint an id")
-
-
-def _direction_faults(names: tuple[str, ...], table: Mapping[str, Any]) -> Iterator[Fault]:
-    for joint, value in table.items():
-        if not _is_number(value) or value not in (1, -1):
-            yield Fault("[servos]", f"direction.{joint}", f"is {value!r}", "Write 1 or -1")
-
-
-def _zero_faults(names: tuple[str, ...], table: Mapping[str, Any]) -> Iterator[Fault]:
-    for joint, value in table.items():
-        if not (_is_number(value) and abs(value) <= math.pi):
-            yield Fault("[servos]", f"zero.{joint}", f"is {value!r}", "Write an angle in rad, -pi to pi")
+def _absent(servos: Mapping[str, Any], driven: Sequence[str]) -> Iterator[Fault]:
+    """What a bus needs and the section does not say."""
+    models = servos.get("models", {})
+    if "model" not in servos and isinstance(models, Mapping):
+        if not models:
+            yield Fault(PLACE, "model", "is missing", f"Known are {', '.join(profile_models())}")
+        elif bare := [name for name in driven if name not in models]:
+            yield Fault(PLACE, "models", f"has none for {', '.join(bare)}", "Write model for all others")
+    if "ids" not in servos:
+        yield Fault(PLACE, "ids", f"has none for {', '.join(driven)}", "Give every joint an id")
 
 
 def _line_faults(servos: Mapping[str, Any], profiles: Any) -> Iterator[Fault]:
@@ -257,36 +211,25 @@ def _line_faults(servos: Mapping[str, Any], profiles: Any) -> Iterator[Fault]:
     for profile in kinds:
         if protocol is not None and protocol != profile.protocol:
             what = f"is {protocol!r}, but a {profile.model} speaks {profile.protocol}"
-            yield Fault("[servos]", "protocol", what, "Leave it out, or name the model with that firmware")
+            yield Fault(PLACE, "protocol", what, "Leave it out, or name the model with that firmware")
     if not (isinstance(baud, int) and not isinstance(baud, bool) and baud > 0):
-        yield Fault("[servos]", "baud", f"is {baud!r}", "Write an integer, such as 1000000")
+        yield Fault(PLACE, "baud", f"is {baud!r}", "Write an integer, such as 1000000")
         return
     for profile in kinds:
         try:
             register_from_baud(profile, baud)
         except InputError as error:
-            yield Fault("[servos]", "baud", str(error), "Write a rate that all servos have")
+            yield Fault(PLACE, "baud", str(error), "Write a rate that all servos have")
 
 
-def _model_fault(model: object, folder: Path | None) -> str:
-    """What is wrong with a model's name, empty if nothing."""
-    if isinstance(model, str):
-        try:
-            load_profile(model, folder)
-            return ""
-        except InputError as error:
-            if isinstance(error, TableError) or has_motor(model, folder):
-                return f"{model!r} has no registers that a bus could write: {error}"
-    return f"{model!r} is unknown"
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
-
-
-_CHECKS: Mapping[str, Any] = {
-    "models": lambda names, table: (),
-    "ids": _id_faults,
-    "direction": _direction_faults,
-    "zero": _zero_faults,
-}
+def _bus_fault(model: str, folder: Path | None) -> str:
+    """Why no bus can talk to a model, empty if one can."""
+    try:
+        load_profile(model, folder)
+        return ""
+    except UnknownNameError as error:
+        if error.what == "servo model file":
+            return f"{model!r} is no file"
+        return f"{model!r} has no registers that a bus could write: {error}"
+    except InputError as error:
+        return f"{model!r} has no registers that a bus could write: {error}"

@@ -120,3 +120,19 @@ def test_the_verb_prints_remarks_and_leaves_with_3_for_an_error(tmp_path, capsys
     path.write_text(text)
     assert run(["check", str(path)]) == 3
     assert "error: masses: no link has a mass" in capsys.readouterr().out
+
+
+def test_servos_that_no_bus_can_play_to_are_warnings_and_missing_files_are_errors(robot):
+    def on(**servos):
+        return replace(robot, servos={**robot.servos, **servos})
+
+    for changed, key in (({"baud": 777_777}, "baud"), ({"protocol": 2.0}, "protocol")):
+        (remark,) = (remark for remark in audit(on(**changed)) if remark.place == f"[servos] {key}")
+        assert remark.level == "warning"
+        assert "send refuses" in remark.advice
+    assert "error: [servos]: unknown servo model file 'mine.toml'" in remarks_at(
+        on(model="mine.toml"), "[servos]"
+    )
+    simulated = replace(robot, servos={"model": "AX-12A"})
+    assert [remark.level for remark in audit(simulated) if "servos" in remark.place] == ["info"]
+    assert not [remark for remark in audit(replace(robot, servos={})) if "servos" in remark.place]

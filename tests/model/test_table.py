@@ -133,8 +133,8 @@ def test_postures_are_evaluated_and_joints_left_out_stand_at_zero():
 
 
 def test_servos_are_kept_as_they_are():
-    text = MINI + '\n[servos]\nmodel = "sin(1)"\nids = { right_knee = 3 }\nlist = [1, "x"]\n'
-    assert parse_robot(text).servos == {"model": "sin(1)", "ids": {"right_knee": 3}, "list": [1, "x"]}
+    text = MINI + '\n[servos]\nmodel = "ax-12"\nzero = { right_knee = 0.25 }\nstiffness = 30\n'
+    assert parse_robot(text).servos == {"model": "ax-12", "zero": {"right_knee": 0.25}, "stiffness": 30}
 
 
 def test_parameters_are_kept_with_their_values():

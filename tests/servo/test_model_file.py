@@ -15,8 +15,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from screwkin.errors import InputError, ScrewkinError, TableError
+from screwkin.model.servo_models import bundled_tables
 from screwkin.model.table import load_robot
-from screwkin.motors.library import bundled_tables, load_motor
+from screwkin.motors.library import load_motor
 from screwkin.servo.bus import Bus
 from screwkin.servo.gate import Bounds
 from screwkin.servo.model_file import bus_faults, unit_scale
