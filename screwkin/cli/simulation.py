@@ -17,7 +17,7 @@ from screwkin.analysis.verdict import Criteria, verdict_of
 from screwkin.cli.output import drawn, plain, progress_bar, remark, say
 from screwkin.errors import UnknownNameError
 from screwkin.files import atomic_write
-from screwkin.report.names import FILM, PAGE, remove_reports
+from screwkin.report.names import FILM, PAGE, remove_reports, remove_simulated
 from screwkin.report.page import write_page
 from screwkin.report.pictures import Saved, save_pictures
 from screwkin.sim.camera import Camera, save_gif
@@ -83,7 +83,7 @@ def simulate_to_files(account: Account, folder: Path, verdict: Path, wish: Wish)
             perturbation=wish.perturbation,
             feedback=wish.feedback,
         )
-    remove_reports(folder)
+    removed = remove_reports(folder) if wish.plots else remove_simulated(folder)
     with atomic_write(verdict) as file:
         data = verdict_of(account.robot, trajectory, check).to_dict()
         file.write(json.dumps(plain(data), indent=2, allow_nan=False) + "\n")
@@ -95,6 +95,8 @@ def simulate_to_files(account: Account, folder: Path, verdict: Path, wish: Wish)
         with progress_bar("pictures") as done:
             pictures = drawn(lambda: [*save_pictures(account, folder, check, done), *more()])
         write_page(folder / PAGE, account, pictures, check, film, wish.commands)
+    if gone := [name for name in removed if not (folder / name).exists()]:
+        remark(f"removed from {folder}, as they showed an earlier result: {', '.join(gone)}")
     return check
 
 

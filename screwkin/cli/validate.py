@@ -11,8 +11,9 @@ import typer
 
 from screwkin.analysis.account import account_of, recorded_robot
 from screwkin.analysis.clear_hands import clearing_hand_drop
-from screwkin.analysis.engines import AUTO, SimulatedCompliance, servo_for, servos_in_words
-from screwkin.analysis.verdict import verdict_of
+from screwkin.analysis.engines import AUTO, SimulatedCompliance, confirms, servo_for, servos_in_words
+from screwkin.analysis.readiness import VERDICT
+from screwkin.analysis.verdict import verdict_from_json, verdict_of
 from screwkin.campaign.feedback_bound import WORLDS
 from screwkin.cli.feedback_runs import feedback_runs
 from screwkin.cli.folder import output_folder
@@ -22,7 +23,7 @@ from screwkin.cli.replay import replay
 from screwkin.cli.simulation import Wish, print_verdict, simulate_to_files
 from screwkin.cli.simulation import engine as engine_named
 from screwkin.errors import InputError, OutputError
-from screwkin.files import make_folder
+from screwkin.files import LARGEST_TEXT, make_folder, read_file
 from screwkin.report.numbers import Number, validation_numbers
 from screwkin.sim.compliant import Compliance
 from screwkin.sim.perturbation_files import described
@@ -90,10 +91,11 @@ def validate(
     output: OutputFolder = None,
     as_json: AsJson = False,
 ) -> int:
-    """Simulate a trajectory and give a verdict: validation.json beside it, plots, report.html.
+    """Simulate a trajectory and give a verdict: validation.json, plots, report.html.
 
-    Without -o all files go beside the trajectory, with --log into replay/ beside the log. Exit code 3 if it
-    does not pass; the reasons are listed.
+    Without -o all files go beside the trajectory, where send looks for the verdict; with --log into replay/
+    beside the log. A verdict by contact forces is never replaced by one of an engine without forces. Exit
+    code 3 if it does not pass; the reasons are listed.
     """
     engine_named(engine)
     compliance = _compliance(compliant, k, sole_stiffness, repeat, servo)
@@ -114,7 +116,8 @@ def validate(
     chosen = servo_for(servo, account.robot, loaded, engine_named(engine), compliance)
     in_words = servos_in_words(servo, account.robot, loaded, engine_named(engine), compliance)
     compliance.on(chosen).for_trajectory(account.robot, loaded)  # refused before anything is written
-    beside = _beside(trajectory)
+    destination = _beside(trajectory) if output is None else output
+    _spare_verdict(destination / VERDICT, engine)
     words = [
         "screwkin",
         "validate",
@@ -127,8 +130,8 @@ def validate(
     ]
     commands = _commands(str(loaded.meta.get("command", "")), words)
     wish = Wish(engine, check_solver, gui, video, plots, commands, compliance, by, servo, feedback)
-    with output_folder(output or beside, "validate", account.robot.name) as folder:
-        check = simulate_to_files(account, folder, beside / "validation.json", wish)
+    with output_folder(destination, "validate", account.robot.name) as folder:
+        check = simulate_to_files(account, folder, folder / VERDICT, wish)
     if as_json:
         print_json({"robot": account.robot.name, **verdict_of(account.robot, loaded, check).to_dict()})
     else:
@@ -137,11 +140,33 @@ def validate(
         numbers.insert(1, Number("servos", *in_words))
         say(aligned(numbers, "  "))
         print_verdict(check)
-        say(f"files in {folder}{'' if folder == beside else f'; validation.json in {beside}'}")
+        say(f"files in {folder}, {VERDICT} among them{_not_sent(folder, trajectory)}")
     drop = clearing_hand_drop(account.robot, loaded, check.self_collisions or ())
     if drop is not None:
         remark(f"hands that hang higher clear all links: plan the walk with --set hand_drop={drop:g}")
     return 0 if check.passed else 3
+
+
+def _spare_verdict(path: Path, engine: str) -> None:
+    """Refuse to replace a verdict by contact forces by one of an engine that has none."""
+    if confirms(engine) or engine == "auto" or not path.is_file():
+        return
+    try:
+        there = verdict_from_json(read_file(path, LARGEST_TEXT).decode())
+    except (InputError, OSError, UnicodeError):
+        return  # nothing that send would take
+    if confirms(there.engine):
+        raise InputError(
+            f"{path} holds the verdict of {there.engine}, which --engine {engine} cannot replace: it has no "
+            "contact forces. Name another folder: -o DIR"
+        )
+
+
+def _not_sent(folder: Path, trajectory: Path) -> str:
+    """What is to be known of a verdict that does not lie beside its trajectory."""
+    if folder.resolve() == trajectory.parent.resolve():
+        return ""
+    return f"; send goes by the one in {trajectory.parent}"
 
 
 def _beside(trajectory: Path) -> Path:

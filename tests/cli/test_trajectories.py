@@ -119,7 +119,7 @@ def test_a_bad_file_is_told_once_and_nothing_is_written(cli, refused, walked, tm
 
 
 def test_a_trajectory_in_a_folder_of_others_tells_what_to_do(cli, refused, walked, monkeypatch):
-    """Another output folder would not help: the verdict lies beside its trajectory."""
+    """Another output folder would not help who wants to send: that verdict lies beside its trajectory."""
 
     def forbidden(folder):
         raise OutputError(f"cannot write to folder {folder}: Permission denied. Name another folder.")

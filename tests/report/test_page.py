@@ -12,7 +12,7 @@ from PIL import Image
 
 import screwkin as sk
 from screwkin.errors import OutputError
-from screwkin.report.names import PICTURES, remove_reports
+from screwkin.report.names import PICTURES, SIMULATED, remove_reports, remove_simulated
 from screwkin.report.page import write_page
 from screwkin.report.pictures import Saved, save_pictures
 
@@ -121,8 +121,20 @@ def test_reports_of_earlier_results_are_removed_and_nothing_else(account, pictur
     assert {picture.path.stem for picture in pictures} <= set(PICTURES)
     for name in ("report.html", "walk.gif", "margin.png", "mine.png", "trajectory.npz", "notes.html"):
         (tmp_path / name).write_bytes(b"old")
-    remove_reports(tmp_path)
+    assert set(remove_reports(tmp_path)) == {"report.html", "walk.gif", "margin.png"}
     assert {path.name for path in tmp_path.iterdir()} == {"mine.png", "trajectory.npz", "notes.html"}
+    assert remove_reports(tmp_path) == ()
+
+
+@pytest.mark.parametrize("simulated", [True, False])
+def test_another_simulation_makes_untrue_what_shows_one_and_no_picture_of_the_plan(tmp_path, simulated):
+    plan = {f"{name}.png" for name in PICTURES if name not in (*SIMULATED, "frames")}
+    shows = {f"{name}.png" for name in SIMULATED} | {"walk.gif"} if simulated else set()
+    for name in (*plan, *shows, "frames.png", "report.html"):
+        (tmp_path / name).write_bytes(b"old")
+    untrue = {"report.html", *shows} | ({"frames.png"} if simulated else set())
+    assert set(remove_simulated(tmp_path)) == untrue
+    assert {path.name for path in tmp_path.iterdir()} == plan | (set() if simulated else {"frames.png"})
 
 
 def test_markup_in_names_is_text(account, robot, tmp_path):
