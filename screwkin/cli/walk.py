@@ -21,7 +21,7 @@ from screwkin.gait.files import default_gait, load_gait
 from screwkin.gait.fitting import fitting_gait
 from screwkin.gait.goals import load_curve, steps_along, steps_to
 from screwkin.gait.listed import Footsteps, load_footsteps, with_footsteps
-from screwkin.gait.record import Gait
+from screwkin.gait.record import Gait, Side
 from screwkin.gait.stand import Place, stand
 from screwkin.gait.walk import walk as walk_of
 from screwkin.gait.write import gait_toml
@@ -39,7 +39,9 @@ def walk(
     list_of_steps: Annotated[
         Path | None,
         typer.Option(
-            "--footsteps", metavar="FILE", help="A CSV file of footholds: x, y [m], yaw [rad], perhaps z [m]."
+            "--footsteps",
+            metavar="FILE",
+            help="A CSV file of footholds: x, y [m], yaw [rad], perhaps z [m] and foot; right foot first.",
         ),
     ] = None,
     goals: Annotated[
@@ -91,7 +93,8 @@ def walk(
     name = gait or (stepping_gait(table.name) if where else default_gait(table.name))
     chosen = changed(fitting_gait(table) if auto else load_gait(name), assignments, rate)
     if where and not places:
-        chosen = with_footsteps(chosen, _steps(table, chosen, list_of_steps, goals or [], curve))
+        first = chosen.first if "first" in settings(assignments) else None
+        chosen = with_footsteps(chosen, _steps(table, chosen, first, list_of_steps, goals or [], curve))
     if places and steps is not None:
         raise InputError("--stand makes no steps; leave --steps out")
     steps = 0 if places else chosen.steps if steps is None else steps
@@ -153,11 +156,16 @@ def _where_to(
 
 
 def _steps(
-    robot: Robot, gait: Gait, footsteps: Path | None, goals: Sequence[str], curve: Path | None
+    robot: Robot,
+    gait: Gait,
+    first: Side | None,
+    footsteps: Path | None,
+    goals: Sequence[str],
+    curve: Path | None,
 ) -> Footsteps:
-    """The list of footsteps that the command line asks for."""
+    """The list of footsteps that the command line asks for, ``first`` the foot that it says swings first."""
     if footsteps is not None:
-        return load_footsteps(footsteps)
+        return load_footsteps(footsteps, first)
     if curve is not None:
         return steps_along(robot, gait, load_curve(curve))
     write = "two lengths in m and an angle in rad, as 0.5,0.2,1.57"
@@ -243,7 +251,8 @@ def write_report(account: Account, folder: Path) -> Path:
 
 def _print_summary(account: Account, gait: Gait, folder: Path) -> None:
     what = f"walks {account.steps} steps" if account.steps else "stands, with the arms"
-    say(f"{account.robot.name} {what} of gait {gait.name}")
+    first = f", the {gait.first} foot first" if account.steps and gait.places else ""
+    say(f"{account.robot.name} {what} of gait {gait.name}{first}")
     say(aligned(walk_numbers(account), "  "))
     for warning in account.warnings:
         remark(f"warning: {warning}")

@@ -102,7 +102,13 @@ _OPTIONAL = {
         0.0,
         within="at least 0",
     ),
-    "lead": Key("time from home into the walk and out of it; 0 for none", "s", 0.0, within="at least 0"),
+    "lead": Key(
+        "time from home into the walk and out of it; 0 for none. Feet must stand as at home then: "
+        'footholds = "parallel" and spread = 0, or a list of footholds',
+        "s",
+        0.0,
+        within="at least 0",
+    ),
     "twist": Key(
         "how far the hips turn along the line from foot to foot with each step, which spares their speed",
         "share",

@@ -65,7 +65,7 @@ def at_home(robot: Robot, stance: Stance, holds: tuple[Foothold, ...], gait: Gai
         waists.append(as_array(placed).astype(float))
     first, second = waists
     if np.abs(first - second).max() > SAME or abs(first[2, 2] - 1) > SAME:
-        raise GaitError(gait.path or f"gait {gait.name}", [_apart(stance, holds)])
+        raise GaitError(gait.path or f"gait {gait.name}", [_apart(gait, stance, holds)])
     height = first[2, 3] - max(hold.z for hold in stand.values())
     com = first @ [*as_array(back @ mass_center(robot, D)).astype(float), 1.0]
     return LeadStance(float(height), first[:2, 3], com[:2])
@@ -81,11 +81,28 @@ def side_by_side(stance: Stance, holds: tuple[Foothold, ...]) -> StepEnd:
     )
 
 
-def _apart(stance: Stance, holds: tuple[Foothold, ...]) -> Fault:
+def _apart(gait: Gait, stance: Stance, holds: tuple[Foothold, ...]) -> Fault:
+    if not gait.places or gait.spread:
+        return _not_at_home(gait)
     place = side_by_side(stance, holds)
     where = f"x {place.x:.6g}, y {place.y:.6g}, z {place.z:.6g} m, yaw {place.yaw:.6g} rad"
     found = f"from home and back need feet as at home, but they stand apart after step {holds[-1].step + 1}"
     return Fault("[gait]", "lead", found, f"Let a last step end at {where}, or set lead = 0")
+
+
+def _not_at_home(gait: Gait) -> Fault:
+    """Feet that the gait itself sets otherwise than at home, and which keys set them so."""
+    now, fix = [], []
+    if gait.spread:
+        now.append(f"spread = {gait.spread:g}")
+        fix.append("spread = 0")
+    if not gait.places and gait.footholds != "parallel":
+        now.append(f'footholds = "{gait.footholds}"')
+        fix.append('footholds = "parallel"')
+    found = (
+        f"from home and back need feet as at home, which {' and '.join(now) or 'these steps'} sets otherwise"
+    )
+    return Fault("[gait]", "lead", found, f"Set {' and '.join(fix)}, or lead = 0" if fix else "Set lead = 0")
 
 
 def samples_of(gait: Gait) -> int:

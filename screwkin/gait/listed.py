@@ -67,12 +67,13 @@ def footsteps(places: Iterable[Sequence[float]], first: Side = "right") -> Foots
     return _read(rows, first, "footsteps")
 
 
-def load_footsteps(path: str | Path) -> Footsteps:
+def load_footsteps(path: str | Path, first: Side | None = None) -> Footsteps:
     """The footsteps of a CSV file with the columns ``x, y, yaw`` and, if wanted, ``z`` [m, rad] and ``foot``.
 
     Args:
-        path: of the file. Numbers may be formulas, such as ``10*deg``. Without ``foot`` the right foot swings
-            first; with it feet must alternate.
+        path: of the file. Numbers may be formulas, such as ``10*deg``. With ``foot`` feet must alternate.
+        first: the foot that swings first where the file has no ``foot``, by default the right one; a file
+            that says otherwise is refused.
 
     Raises:
         GaitError: the file cannot be read, or rows are wrong; all faults are named at once.
@@ -98,17 +99,20 @@ def load_footsteps(path: str | Path) -> Footsteps:
         raise GaitError(str(path), faults)
     table = [dict(zip(names, (cell.strip() for cell in line), strict=True)) for _, line in rows[1:]]
     feet = [row.pop(FOOT, "") for row in table]
-    first = feet[0] if feet and feet[0] else "right"
+    begins = feet[0] if feet and feet[0] else first or "right"
     other = {"right": "left", "left": "right"}
-    wanted = [first if i % 2 == 0 else other.get(first, "") for i in range(len(feet))]
+    wanted = [begins if i % 2 == 0 else other.get(begins, "") for i in range(len(feet))]
     wrong = [
         Fault(f"row {i}", FOOT, f"{foot!r} where the {side or 'right or left'} foot swings", "Feet alternate")
         for (i, _), foot, side in zip(rows[1:], feet, wanted, strict=True)
-        if foot not in ("", side) or first not in other
+        if foot not in ("", side) or begins not in other
     ]
+    if first is not None and begins != first and not wrong:
+        fix = f"Leave first = {first} out, or write {first} there and alternate from it"
+        wrong = [Fault(f"row {rows[1][0]}", FOOT, f"{begins!r}, but first = {first} is asked for", fix)]
     if wrong:
         raise GaitError(str(path), wrong)
-    return _read(table, cast(Side, first), str(path))
+    return _read(table, cast(Side, begins), str(path))
 
 
 def with_footsteps(gait: Gait, steps: Footsteps) -> Gait:

@@ -27,6 +27,7 @@ _BACK = 4  # values that are planned in full before a key is given up
 _LOWEST, _HIGHEST, _HEIGHTS = 0.5, 0.98, 17  # waist heights that are tried, of legs stretched down
 _TOGETHER = (0.93, 0.87, 0.8)  # those that are tried with smaller moves
 _SHARES = (0.75, 0.5, 0.25, 0.1)  # of stride, side, turn and lift together
+_NO_STEP = 10.0  # times the length of a leg: what no step is meant to be
 _TOO = {"stride": "long", "side": "wide", "turn": "far", "lift": "high", "sway": "wide", "spread": "wide"}
 
 
@@ -40,7 +41,8 @@ def with_remedy(error: NoSolutionError, robot: Robot, gait: Gait, steps: int) ->
         steps: of the walk.
     """
     if gait.places:
-        error.args = (f"{error}. {_listed(error, gait)}", *error.args[1:])
+        said = [str(error), _listed(error, gait), _millimetres(robot, gait)]
+        error.args = (". ".join(filter(None, said)), *error.args[1:])
         return error
     trial = _Trial(robot, gait, steps)
     limb = getattr(error, "limb", "")
@@ -49,15 +51,24 @@ def with_remedy(error: NoSolutionError, robot: Robot, gait: Gait, steps: int) ->
 
 
 def _listed(error: NoSolutionError, gait: Gait) -> str:
-    """Which foothold of a list is being stepped onto where a limb fails, and what to change."""
+    """Which foothold is being stepped onto where a limb fails, and what to change; else the error says so."""
     sample = getattr(error, "sample", -1)
     if sample < 0:
-        return "Move the footholds that the message names"
+        return ""
     n = listed_step(gait, sample / gait.rate)
     place = gait.places[n]
     where = f"x {place.x:g}, y {place.y:g} m, yaw {math.degrees(math.remainder(place.yaw, math.tau)):.4g} deg"
     nearer = f"bring it nearer, or lower waist_height = {gait.waist_height:g}"
     return f"This is in step {n + 1}, onto {where}: {nearer}"
+
+
+def _millimetres(robot: Robot, gait: Gait) -> str:
+    """That lengths are in metres, where a step of a list is longer than any robot could mean."""
+    ways = np.diff([(0.0, 0.0, 0.0), *((place.x, place.y, place.z) for place in gait.places)], axis=0)
+    longest = float(np.abs(ways).max())
+    if not longest > _NO_STEP * lengths_of(robot)["leg"]:
+        return ""
+    return f"Footholds are in metres: one lies {longest:g} m from the last; write 40*mm for millimetres"
 
 
 @dataclass(frozen=True, eq=False)

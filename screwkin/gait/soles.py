@@ -71,7 +71,14 @@ def check_soles(gait: Gait, stance: Stance, feet: dict[str, Motion], time: Array
 def _advice(gait: Gait, time: float) -> str:
     if gait.places:
         step = listed_step(gait, time) + 1
-        return f"This is in step {step}: move its foothold, or the ones before and after it, apart"
+        feet = (gait.first, "left" if gait.first == "right" else "right")
+        swings = f"the {feet[(step - 1) % 2]} foot swings"
+        if step > 1:
+            swings += f", the {gait.first} one in step 1"
+        return (
+            f"This is in step {step}, in which {swings} (column foot of a file, or first): move its foothold,"
+            " or the ones before and after it, apart"
+        )
     towards = gait.side if gait.side != 0 else gait.turn
     wanted = "left" if towards > 0 else "right"
     if gait.footholds == "close" and towards != 0 and gait.first != wanted:

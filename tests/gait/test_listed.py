@@ -15,7 +15,7 @@ from screwkin.errors import GaitError, InputError, NoSolutionError
 from screwkin.gait.files import parse_gait
 from screwkin.gait.footsteps import footholds
 from screwkin.gait.listed import Footsteps, load_footsteps, with_footsteps
-from screwkin.gait.record import gait_from_dict
+from screwkin.gait.record import Side, gait_from_dict
 from screwkin.gait.stance import stance_of
 from screwkin.gait.write import gait_toml
 from tests.gait.footstep_lists import irregular
@@ -109,8 +109,21 @@ def test_what_cannot_be_stepped_onto_is_named_by_its_step() -> None:
     with pytest.raises(NoSolutionError, match=r"in step [23], onto x "):
         sk.walk(ROBOT, GAIT, sk.footsteps(far))
     on_the_other = [places[0], (places[0][0], places[0][1] + 0.01, places[0][2])]
-    with pytest.raises(NoSolutionError, match=r"overlap .*in step 2: move its foothold"):
+    with pytest.raises(NoSolutionError, match=r"overlap .*in step 2, .* apart$") as caught:
         sk.walk(ROBOT, GAIT, sk.footsteps(on_the_other))
+    assert "the left foot swings, the right one in step 1 (column foot" in str(caught.value)
+    with pytest.raises(NoSolutionError, match=r"in step 1, in which the left foot swings \(column foot"):
+        sk.walk(ROBOT, GAIT, sk.footsteps(places[:1], first="left"))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_millimetres_are_recognised_and_long_steps_in_metres_are_not_taken_for_them(seed: int) -> None:
+    places = irregular(ROBOT, 3, seed)
+    for scale, named in ((1000.0, True), (3.0, False)):
+        far = [(scale * x, scale * y, yaw) for x, y, yaw in places]
+        with pytest.raises(NoSolutionError) as caught:
+            sk.walk(ROBOT, GAIT, sk.footsteps(far))
+        assert ("Footholds are in metres" in str(caught.value)) is named
 
 
 @pytest.mark.parametrize(
@@ -140,6 +153,21 @@ def test_a_file_of_footsteps_is_read_with_formulas_and_feet(tmp_path: Path) -> N
     assert load_footsteps(file) == Footsteps(
         sk.footsteps([(0.05, 0.042, np.radians(10)), (0.1, -0.042, 0)]).places, "left"
     )
+
+
+@pytest.mark.parametrize("first", ["right", "left", None])
+@pytest.mark.parametrize("told", ["right", "left", "", None])
+def test_the_foot_that_begins_is_the_files_else_the_one_asked_for_else_the_right(
+    tmp_path: Path, first: Side | None, told: str | None
+) -> None:
+    file = tmp_path / "steps.csv"
+    head, row = ("x,y,yaw\n", "0,0,0\n") if told is None else ("foot,x,y,yaw\n", f"{told},0,0,0\n")
+    file.write_text(head + row)
+    if told and first and told != first:
+        with pytest.raises(GaitError, match=rf"row 2, key foot: '{told}', but first = {first} is asked for"):
+            load_footsteps(file, first)
+    else:
+        assert load_footsteps(file, first).first == (told or first or "right")
 
 
 @pytest.mark.parametrize(
@@ -183,6 +211,20 @@ def test_the_command_line_walks_a_file(tmp_path: Path, capsys: pytest.CaptureFix
     saved = sk.load_trajectory(tmp_path / "out" / "trajectory.npz")
     np.testing.assert_allclose(ends(saved), irregular(ROBOT, 4, 0), atol=1e-12)
     assert "--footsteps" in saved.meta["command"]
+
+
+def test_the_command_line_honours_the_first_foot_that_is_set(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, out = tmp_path / "steps.csv", tmp_path / "out"
+    file.write_text("x,y,yaw\n0.03,0.042165,0\n0.03,-0.042165,0\n")
+    words = ["walk", "bioloid", "--footsteps", str(file), "--no-plots", "-o", str(out)]
+    assert run([*words, "--set", "first=left"]) == 0
+    assert "the left foot first" in capsys.readouterr().out
+    assert sk.load_trajectory(out / "trajectory.npz").meta["gait"]["gait"]["first"] == "left"
+    file.write_text("x,y,yaw,foot\n0.03,0.042165,0,left\n0.03,-0.042165,0,right\n")
+    assert run([*words, "--set", "first=right"]) == 2
+    assert "'left', but first = right is asked for" in capsys.readouterr().err
 
 
 @pytest.mark.slow
