@@ -55,11 +55,14 @@ CHANNEL_MEANINGS = {
     "hand_raise": "above hand_drop below the shoulder, both hands [m]",
 }
 LENGTH_MEANINGS = {
-    "leg": "from hip to ankle, stretched",
-    "hip": "distance of the hips from each other",
-    "sole": "length of a sole",
-    "waist": "height of the waist above the hips",
-    "arm": "from shoulder to hand, stretched",
+    "leg": "from hip to sole: greatest height of the hips above the floor, stretched straight down from "
+    "`home` as far as joints and limits allow",
+    "hip": "distance of the hips from each other; a hip is the point of the leg's first own axis nearest to "
+    "the next one that is not parallel to it",
+    "sole": "length of the shorter sole, along the foot's x axis",
+    "waist": "height of the steered frame above the hips; 0 without `[waist]`",
+    "arm": "how far the hand of the shorter arm hangs below its shoulder at `home`; half a `leg` "
+    "where none does",
 }
 PREVIEW_MEANINGS = {
     "dsp": ("share of Tc with both feet on the floor", "must be given; 0.2"),
@@ -189,7 +192,8 @@ def gaits() -> str:
             table(("parameter", "what", "default, or usual"), preview),
             "## Lengths of the robot",
             "Formulas may use lengths of the robot at hand, so that one gait fits many: "
-            '`stride = "0.3*leg"`. A walk writes their values to `[lengths]`.',
+            '`stride = "0.3*leg"`. A trajectory records their values with its '
+            "gait.",
             table(("length", "what"), lengths),
             "## [channel.NAME]",
             CHANNELS_BEGIN,

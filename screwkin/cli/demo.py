@@ -19,9 +19,10 @@ from screwkin.cli.output import aligned, print_json, remark, say, silent
 from screwkin.cli.playing import played
 from screwkin.cli.send import virtual_bus
 from screwkin.cli.simulation import Wish, simulate_to_files
-from screwkin.cli.walk import chosen_gait, command_of, make_trajectory, write_report
+from screwkin.cli.walk import chosen_gait, command_of, limbed, make_trajectory, write_report
 from screwkin.errors import MissingDependencyError, SafetyError
 from screwkin.gait.files import default_gait
+from screwkin.gait.fitting import fitting_gait
 from screwkin.gait.record import Gait
 from screwkin.model.library import robot_names
 from screwkin.model.robot import Robot
@@ -41,7 +42,10 @@ def demo(
         typer.Argument(metavar="[ROBOT]", help="A robot's name or table; default: the first bundled one."),
     ] = None,
     gait: Annotated[
-        str | None, typer.Option(metavar="NAME|FILE", help="The gait; default as for walk.")
+        str | None,
+        typer.Option(
+            metavar="NAME|FILE", help="The gait; default as for walk, with --auto if the robot is your own."
+        ),
     ] = None,
     steps: Annotated[int, typer.Option(help="Number of steps.")] = 6,
     output: OutputFolder = None,
@@ -55,14 +59,19 @@ def demo(
     show = say if not as_json else remark if sys.stderr.isatty() else silent
     name = robot or robot_names()[0]
     table = load_robot(name)
-    gait = gait or default_gait(table.name)
-    chosen = chosen_gait(gait, [], None)
+    fits = gait is None and name not in robot_names()
+    if fits:
+        table = table if table.limbs else limbed(table)
+        chosen = fitting_gait(table)
+    else:
+        gait = gait or default_gait(table.name)
+        chosen = chosen_gait(gait, [], None)
     with output_folder(output, "demo", table.name) as folder:
         _show_robot(show, table)
         facts = facts_of(table)
         _show_mechanism(show, facts)
         _show_gait(show, chosen, steps)
-        command = command_of(name, gait, steps, [], None)
+        command = command_of(name, None if fits else gait, steps, [], None)
         account = make_trajectory(table, chosen, steps, command, folder)
         show(
             f"   The loops close to {account.max_closure:.0e} m; rates and accelerations by Davies' method.\n"

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -15,7 +16,7 @@ from screwkin.cli.compensated import CompensateBy, Passes, ServoStiffness, compe
 from screwkin.cli.folder import output_folder
 from screwkin.cli.options import AsJson, FittingGait, GaitName, OutputFolder, RobotName, numbers_of, settings
 from screwkin.cli.output import aligned, drawn, print_json, progress_bar, remark, say
-from screwkin.errors import InputError
+from screwkin.errors import InputError, NoSolutionError
 from screwkin.files import atomic_write
 from screwkin.gait.files import default_gait, load_gait
 from screwkin.gait.fitting import fitting_gait
@@ -100,7 +101,8 @@ def walk(
     steps = 0 if places else chosen.steps if steps is None else steps
     command = command_of(robot, None if auto else name, steps, assignments, rate, where)
     with output_folder(output, "walk", table.name) as folder:
-        account, remedied = _planned(table, chosen, steps, command, _places(places or [])), None
+        with _advice_to_fit(default=not (auto or gait or where)):
+            account, remedied = _planned(table, chosen, steps, command, _places(places or [])), None
         if wanted is not None:
             command = shlex.join([*shlex.split(command), *wanted.words])
             remedied = compensated(table, account.trajectory, wanted, command, folder)
@@ -120,6 +122,17 @@ def walk(
         if remedied is not None:
             say(remedied.text())
     return 0
+
+
+@contextmanager
+def _advice_to_fit(default: bool) -> Iterator[None]:
+    """Where nobody chose the gait, and the robot cannot walk it: one may be fitted to the robot."""
+    try:
+        yield
+    except (NoSolutionError, InputError) as error:
+        if default:
+            error.args = (f"{error}; or fit a gait to the robot: --auto", *error.args[1:])
+        raise
 
 
 def stepping_gait(robot: str) -> str:

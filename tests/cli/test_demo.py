@@ -4,6 +4,9 @@ import json
 
 import pytest
 
+import screwkin as sk
+from tests.bodies import humanoid
+
 
 @pytest.fixture(scope="module")
 def shown(tmp_path_factory):
@@ -119,3 +122,12 @@ def test_a_robot_without_servos_has_nothing_to_play_to(tmp_path):
     play = _played_to_virtual(tmp_path / "trajectory.npz", "linkages/four-bar", tmp_path / "play.npz")
     assert play["lines"] == ["The robot's table has no [servos]: nothing to play to."]
     assert (play["packets"], play["servos"]) == (0, None)
+
+
+def test_a_robot_of_ones_own_walks_a_gait_that_fits_it(cli, without_pictures, tmp_path):
+    path = tmp_path / "body.toml"
+    path.write_text(humanoid(), encoding="utf-8")
+    called = cli("demo", path, "--steps", 1, "-o", tmp_path / "out")
+    assert called.code in (0, 3), called.err
+    assert "3. The gait auto" in called.out
+    assert "--auto" in sk.load_trajectory(tmp_path / "out" / "trajectory.npz").meta["command"]

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import screwkin as sk
+from tests.bodies import humanoid
 
 WALK = ("walk", "bioloid", "--gait", "paper", "--no-plots")
 
@@ -235,3 +236,16 @@ def test_auto_chooses_a_gait_and_writes_it_with_the_robot_beside_the_trajectory(
     np.testing.assert_array_equal(one.q, two.q)
     assert again["gait"] == "auto"
     assert cli("walk", "bioloid", "--auto", "--gait", "walk").code == 2
+
+
+@pytest.mark.parametrize("words", [[], ["--gait", "walk"], ["--auto"]], ids=str)
+def test_who_chose_no_gait_is_told_of_one_that_fits(cli, tmp_path, words):
+    """The default gait has lengths of its own; one that is fitted to the robot has the robot's."""
+    path = tmp_path / "body.toml"
+    path.write_text(humanoid(), encoding="utf-8")
+    called = cli("walk", path, *words, "--steps", 1, "--no-plots", "-o", "out")
+    if "--auto" in words:
+        assert called.code == 0, called.err
+    else:
+        assert called.code == 3
+        assert called.err.rstrip().endswith("or fit a gait to the robot: --auto") == (not words)
