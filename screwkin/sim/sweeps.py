@@ -28,7 +28,7 @@ SERVED = 250.0
 FURTHER = 2.0
 """Sweeps for every time more."""
 RIGID = 2
-"""Times as many with rigid servos. The contact ZMP of the Bioloid's ``step-in-place`` is then .12 mm RMS from
+"""Times as many with rigid servos. A kit's contact ZMP of ``step-in-place`` is then .12 mm RMS from
 its plan, not .29; twice as many again take .05 mm off it."""
 
 
