@@ -30,6 +30,16 @@ A table is a TOML file. All points, axes and frames are those of the zero pose, 
 origin. Any number may be arithmetic over `[parameters]`, such as `"thigh + 2*mm"`; `pi`, `deg` and `mm`
 are known. Unknown keys are errors. `[waist]` is the frame that gaits steer, by default midway between the
 hips."""
+WAIST = """\
+The frame that gaits steer, fixed to the base link: its origin is what `waist_height` is the height of, x is
+ahead and z up at `home`. Without this table it lies midway between the hips, its axes those of the feet at
+`home`."""
+MIRRORED = """\
+Links, joints, closures, tips and soles of the limb are reflected, from the first link on whose name has a
+side; their names and that of the limb must say `right` or `left` (`right_knee`), or begin with `R_` or `L_`.
+A joint whose axis lies in the xz plane keeps its axis, and its limits change sign and places (0 to 2 becomes
+-2 to 0), as those of a prismatic joint along y; every other joint has the mirrored axis and the same limits.
+Postures and `[servos]` are not reflected: give the positions, ids, directions and zeros of both sides."""
 GAITS_BEGIN = """\
 A gait is a TOML file. `screwkin gaits` lists the bundled ones, `screwkin walk ROBOT --gait FILE` walks
 it, and `--set key=value` changes any key for one walk."""
@@ -127,7 +137,8 @@ def robot_tables() -> str:
         _row_model(f"[{'[' * (name != 'robot')}{name}{']' * (name != 'robot')}]", kind)
         for name, kind in {"robot": schema.RobotRow, **schema.ROWS}.items()
     ]
-    parts.append(_row_model("[[limb]] with mirror", schema.MirrorRow))
+    parts += [_row_model("[[limb]] with mirror", schema.MirrorRow), MIRRORED]
+    parts.append(_row_model("[waist]", schema.FrameRow).replace("A frame in", WAIST + " A frame in", 1))
     inline = {
         "frame": schema.FrameRow,
         "inertia": schema.InertiaRow,

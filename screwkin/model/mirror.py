@@ -18,7 +18,8 @@ from screwkin.model.schema import InertiaRow, JointRow, MimicRow, Row, SpringRow
 Item = TypeVar("Item")
 
 _SIDE = re.compile(r"(?<![A-Za-z])(right|left|Right|Left|RIGHT|LEFT)(?![a-z])")
-_OTHER = {"right": "left", "Right": "Left", "RIGHT": "LEFT"}
+_LETTER = re.compile(r"^(R|L|r|l)(?=_)")
+_OTHER = {"right": "left", "Right": "Left", "RIGHT": "LEFT", "R": "L", "r": "l"}
 _OTHER |= {left: right for right, left in _OTHER.items()}
 _NAMES = ("name", "link", "tip", "limb")
 _EDGES = ("size", "box")
@@ -26,12 +27,13 @@ _LINKS = ("parent", "child", "link_a", "link_b")
 
 
 def swapped(name: str) -> str:
-    """The name on the other side: right <-> left; unchanged if it names no side."""
-    return _SIDE.sub(lambda side: _OTHER[side[0]], name)
+    """The name on the other side: right <-> left, else R_ <-> L_ before it; unchanged if it names no side."""
+    letters = _SIDE if _SIDE.search(name) else _LETTER
+    return letters.sub(lambda side: _OTHER[side[0]], name)
 
 
 def is_sided(name: str) -> bool:
-    """True if the name says right or left."""
+    """True if the name says right or left, or begins with R_ or L_."""
     return swapped(name) != name
 
 

@@ -14,7 +14,7 @@ from screwkin.model.checks import row_faults
 from screwkin.model.coupled import coupling_text, tightened
 from screwkin.model.expression import listed, resolve_parameters
 from screwkin.model.mesh_files import full_path
-from screwkin.model.mirror import swapped, turns_around
+from screwkin.model.mirror import turns_around
 from screwkin.model.records import LIMIT_TOLERANCE, CoupledJoint, Joint, Link, RobotRecord
 from screwkin.model.rows import Rows, parameters_of, read_rows
 from screwkin.model.servo_section import Mounted, servo_faults
@@ -99,8 +99,6 @@ def _servo_faults(table: CheckedTable) -> Iterator[Fault]:
     rows = [row for _, row in table.rows.good("joint")]
     still = [row.name for row in rows if row.passive or row.mimic is not None]
     driven = [name for name in table.joints if name not in still]
-    if table.structural:
-        driven += [other for name in driven if (other := swapped(name)) not in table.joints]
     complete = not (table.structural or table.rows["closure"])
     return servo_faults(table.rows.servos, Mounted(driven, still, complete))
 

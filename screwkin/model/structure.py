@@ -40,7 +40,7 @@ class Named(NamedTuple):
 
 def structure_faults(rows: Rows, mirrored: Iterable[Mirrored]) -> Iterator[Fault]:
     """All faults of names and connections, mirrored rows included."""
-    named = list(_all_names(rows, list(mirrored)))
+    named = _all_names(rows, list(mirrored))
     yield from _duplicates(named, rows.robot.text("base_link"))
     yield from _unknown(rows, named)
     yield from _tree_faults(rows)
@@ -88,7 +88,8 @@ def mirrored_limbs(rows: Rows) -> tuple[list[Mirrored], list[Fault]]:
             faults.append(Fault(entry.where, "of", f"{of!r} is not such a limb", fix))
             continue
         if swapped(of) != name or not is_sided(of):
-            fix = f"Write name = {swapped(of)!r}" if is_sided(of) else "Call the limbs right_... and left_..."
+            two = "Call the limbs right_... and left_..., or R_... and L_..."
+            fix = f"Write name = {swapped(of)!r}" if is_sided(of) else two
             faults.append(Fault(entry.where, "name", f"{name!r} is not {of!r} on the other side", fix))
         part = limb_part(carried, plain[of].text("link"))
         mirrored.append(Mirrored(entry.where, name, of, tuple(link for link in part if link not in done)))
@@ -104,7 +105,7 @@ def _is_mirror(entry: TableEntry) -> bool:
 def _sideless(rows: Rows, entry: TableEntry, source: TableEntry, part: tuple[str, ...]) -> Iterator[Fault]:
     """Everything that is reflected needs right or left in its name, to have another one."""
     joints = [e.text("name") for e in rows["joint"] if e.text("child") in part]
-    fix = "Put right or left into its name, as in right_knee"
+    fix = "Put right or left into its name, as in right_knee, or R_ or L_ before it"
     if not part:
         link = source.text("link")
         yield Fault(entry.where, "of", f"no link on the way to {link!r} names a side", fix)
@@ -114,7 +115,19 @@ def _sideless(rows: Rows, entry: TableEntry, source: TableEntry, part: tuple[str
                 yield Fault(entry.where, "of", f"{what} {name!r} is mirrored but names no side", fix)
 
 
-def _all_names(rows: Rows, mirrored: list[Mirrored]) -> Iterator[Named]:
+def _all_names(rows: Rows, mirrored: list[Mirrored]) -> list[Named]:
+    """Everything that has a name, mirrored things included, and what a faulty mirror was to bring."""
+    named = list(_declared(rows, mirrored))
+    good = {limb.name for limb in mirrored if swapped(limb.of) == limb.name}
+    for entry in rows["limb"]:
+        if _is_mirror(entry) and entry.text("name") not in good:
+            there = {(one.kind, one.name) for one in named}
+            other = (one._replace(name=swapped(one.name), where=entry.where, key="of") for one in named)
+            return [*named, *(one for one in other if (one.kind, one.name) not in there)]
+    return named
+
+
+def _declared(rows: Rows, mirrored: list[Mirrored]) -> Iterator[Named]:
     """Everything that has a name, mirrored things included."""
     for table in ("link", "joint", "closure", "frame", "limb", "posture"):
         for entry in rows[table]:
@@ -239,7 +252,7 @@ def _sole_faults(rows: Rows, named: list[Named]) -> Iterator[Fault]:
         if limb not in limbs:
             fix = f"{near(limb, limbs)}Limbs: {listed(limbs)}"
             yield Fault(entry.where, "limb", f"there is no limb {limb!r}", fix)
-        elif kinds.get(source[limb]) not in ("leg", ""):
+        elif kinds.get(source.get(limb, swapped(limb))) not in ("leg", ""):
             yield Fault(entry.where, "limb", f"limb {limb!r} is no leg", 'Soles are for kind = "leg"')
         if limb in seen:
             yield Fault(entry.where, "limb", f"limb {limb!r} has a sole at {seen[limb]}", "Keep one of them")

@@ -15,7 +15,7 @@ from screwkin.algebra.se3 import as_array
 from screwkin.model.mirror import is_sided, swapped
 from screwkin.model.robot import Joint
 from screwkin.model.table import parse_robot
-from tests.model.tables import MINI, changed, displacements, matrix_of
+from tests.model.tables import MINI, changed, displacements, faults_of, matrix_of
 
 M3, M = np.diag([1.0, -1.0, 1.0]), np.diag([1.0, -1.0, 1.0, 1.0])
 
@@ -198,9 +198,49 @@ def test_a_loop_within_a_limb_is_mirrored_with_it():
         ("upright", "upright"),
         ("lefty_frame", "lefty_frame"),
         ("torso", "torso"),
+        ("R_knee", "L_knee"),
+        ("l_hip_r", "r_hip_r"),
+        ("left_l_bolt", "right_l_bolt"),
+        ("hip_r", "hip_r"),
+        ("Lever", "Lever"),
     ],
 )
 def test_right_and_left_are_swapped_as_words(name, other):
     assert swapped(name) == other
     assert swapped(other) == name
     assert is_sided(name) == (name != other)
+
+
+@pytest.mark.parametrize("marks", [("R_", "L_"), ("L_", "R_"), ("r_", "l_")], ids=str)
+def test_sides_may_be_letters_before_the_names(marks):
+    """The same robot, with names of another manner."""
+    own, other = marks
+    robot = parse_robot(MINI.replace("right_", own).replace("left_", other))
+    for name, renamed in zip(parse_robot(MINI).joint_names, robot.joint_names, strict=True):
+        assert renamed == name.replace("right_", own).replace("left_", other)
+
+
+FAILED = (
+    ('of = "right_leg"', 'of = "right_lge"'),
+    ('of = "right_leg"', ""),
+    ('name = "left_leg"', 'name = "left_lge"'),
+    ('name = "left_leg"', 'name = "leg"'),
+    ('mirror = "y"', 'mirror = "x"'),
+    ('mirror = "y"', ""),
+)
+
+
+@pytest.mark.parametrize(("old", "new"), FAILED)
+def test_a_failed_mirror_is_one_fault_and_nothing_echoes_it(old, new):
+    """Whatever else names what it was to bring: postures, soles, closures, frames, couplings and servos."""
+    more = """
+[[frame]]
+name = "heel"
+link = "left_shin"
+pose = { xyz = [0, 0, 0] }
+
+[servos]
+ids = { right_hip = 1, right_knee = 2, left_hip = 3, left_knee = 4 }
+"""
+    assert parse_robot(MINI + more)
+    assert len(faults_of(changed(old, new) + more)) == 1
