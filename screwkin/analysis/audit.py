@@ -27,8 +27,11 @@ _HEAVY = 0.7  # share of the robot's mass in one of several links
 _FAST = 100.0  # rad/s or m/s: beyond any joint of a robot
 _STRONG = 50.0  # times the torque that would hold all of the robot at arm's length of its own size
 _OUTSIDE = 1.5  # times the size of a link: its CoM or radius of gyration beyond it is in other units
+_BARE = 0.1  # times the largest link: distances of axes below it are no size of a link without shapes
 _POINT = 0.02  # times the size of a link: radii of gyration of bodies are larger
 _TURN = 2 * math.pi
+_DEGREES = 2 * _TURN
+"""Beyond it a limit is one in degrees [rad]: two turns are more than any joint of a robot has."""
 _GRAVITY = 9.81
 
 
@@ -44,6 +47,11 @@ def audit(robot: Robot) -> tuple[Remark, ...]:
     expect(robot, Robot, "robot", 'load_robot("NAME")')
     seen = link_points(robot)
     places = {link.name: _places(robot, link, seen.points.get(link.name)) for link in robot.links}
+    sizes = {name: _size(points) for name, points in places.items()}
+    bare = _BARE * max(sizes.values(), default=0.0)  # axes that cross say nothing of the size of their link
+    for name, size in sizes.items():
+        if name not in seen.points and size < bare:
+            places[name] = np.zeros((0, 3))
     remarks = [
         *_masses(robot),
         *(remark for link in robot.links for remark in _link(link, places[link.name])),
@@ -107,6 +115,11 @@ def _places(robot: Robot, link: Link, points: Array | None) -> Array:
     return np.array(feet) if len(feet) > 1 else np.zeros((0, 3))
 
 
+def _size(points: Array) -> float:
+    """The diagonal of a box around points (k, 3)."""
+    return float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
+
+
 def _link(link: Link, places: Array) -> Iterator[Remark]:
     where, mass = f"link {link.name}", float(link.mass)
     moments = np.linalg.eigvalsh(inertia_matrix(link.inertia))
@@ -119,7 +132,7 @@ def _link(link: Link, places: Array) -> Iterator[Remark]:
     if not mass > 0 or len(places) < 2:
         return
     low, high = places.min(axis=0), places.max(axis=0)
-    size = float(np.linalg.norm(high - low))
+    size = _size(places)
     com = as_array(link.com).astype(float)
     away = float(np.linalg.norm(np.maximum(np.maximum(low - com, com - high), 0.0)))
     if away > _OUTSIDE * size:
@@ -141,6 +154,9 @@ def _joint(robot: Robot, joint: Joint) -> Iterator[Remark]:
         yield Remark("warning", where, what, "Write its limits, or make it part of its parent link")
     elif not math.isfinite(joint.upper - joint.lower):
         yield Remark("info", where, "it has no limits", "Nothing will keep a motion from winding it up")
+    elif joint.type != "prismatic" and max(abs(joint.lower), abs(joint.upper)) > _DEGREES:
+        what = f"its limits are {joint.lower:.4g} and {joint.upper:.4g} rad, {joint.upper / _TURN:.3g} turns"
+        yield Remark("warning", where, what, 'Limits are in rad; write "130*deg" for degrees')
     elif joint.type != "prismatic" and joint.upper - joint.lower > _TURN + LIMIT_TOLERANCE:
         yield Remark("info", where, f"it turns by {joint.upper - joint.lower:.3g} rad", "Check its limits")
     for posture in robot.postures:

@@ -98,11 +98,25 @@ def _soles(robot: Robot, waist: Pose) -> Iterator[Remark]:
         if not _below_joints(robot, leg, waist, D, heights[leg.name]):
             what = "does not lie below the last joint of its leg at home"
             yield Remark("warning", place, what, "Check its corners, and which way is up")
+    if heights and robot.base == "floating":
+        yield from _above_floor(robot, waist, min(heights.values()))
     if heights and max(heights.values()) - min(heights.values()) > _ON_FLOOR:
         apart = 1e3 * (max(heights.values()) - min(heights.values()))
         yield Remark(
             "warning", "soles", f"heights at home differ by {apart:.3g} mm", "Write a home that stands"
         )
+
+
+def _above_floor(robot: Robot, waist: Pose, height: float) -> Iterator[Remark]:
+    """A home that stands above the floor or in it, for the lowest sole at a height under the waist [m]."""
+    if float(waist.R.z.z) < math.cos(_LEVEL):
+        return  # a base that lies on its side has no height to compare
+    home = robot.posture("home").base_height
+    off = float(home + waist.p.z) + height
+    if abs(off) > _ON_FLOOR:
+        where = f"{1e3 * abs(off):.3g} mm {'above' if off > 0 else 'below'} the floor"
+        advice = f"Write base_height = {home - off:.4g}"
+        yield Remark("warning", "posture home", f"base_height = {home:.4g} leaves the soles {where}", advice)
 
 
 def _below_joints(robot: Robot, leg: Limb, waist: Pose, D: Sequence[Displacement], height: float) -> bool:

@@ -166,6 +166,11 @@ def map_faults(robot: Robot) -> list[Fault]:
     return _read(robot)[0]
 
 
+def profiles_of(robot: Robot) -> Mapping[str, Profile]:
+    """The profile of the servo of every joint with a motor, by its name; those without one are left out."""
+    return _read(robot)[1]
+
+
 def _read(robot: Robot) -> tuple[list[Fault], dict[str, Profile]]:
     """All faults of the section, and the profile of every joint with a motor whose model has one."""
     servos, folder = robot.servos, table_folder(robot)

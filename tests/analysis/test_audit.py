@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import screwkin as sk
+from screwkin.algebra.se3 import Vector
 from screwkin.analysis.audit import added_by_pybullet, audit
 from screwkin.cli import run
 from screwkin.model.robot import Inertia, Robot
@@ -136,3 +139,63 @@ def test_servos_that_no_bus_can_play_to_are_warnings_and_missing_files_are_error
     simulated = replace(robot, servos={"model": "AX-12A"})
     assert [remark.level for remark in audit(simulated) if "servos" in remark.place] == ["info"]
     assert not [remark for remark in audit(replace(robot, servos={})) if "servos" in remark.place]
+
+
+@pytest.mark.parametrize("off", [-0.05, -0.003, 0.003, 0.195])
+@pytest.mark.parametrize("name", NAMES)
+def test_a_home_whose_soles_leave_the_floor_is_a_warning_with_the_height_that_stands(name, off):
+    robot = sk.load_robot(name)
+
+    def raised(by):
+        return replace(
+            robot, postures=tuple(replace(p, base_height=p.base_height + by) for p in robot.postures)
+        )
+
+    said = remarks_at(raised(off), "posture home")
+    assert f"{1e3 * abs(off):.3g} mm {'above' if off > 0 else 'below'} the floor" in said
+    right = float(said.split("Write base_height = ")[1])
+    assert right == pytest.approx(robot.posture("home").base_height, abs=2e-4)
+    assert remarks_at(raised(off / 1000), "posture home") == ""
+
+
+@pytest.mark.parametrize("factor", [1.2, 10.0])
+@pytest.mark.parametrize(("key", "unit"), [("effort", "N m"), ("velocity", "rad/s")])
+def test_joints_beyond_the_data_sheet_of_their_servo_are_warnings(robot, key, unit, factor):
+    sheet = {"effort": 1.5, "velocity": 59 * 2 * math.pi / 60}[key]  # of the maker, at 12 V
+    eager = with_joint(robot, "left_knee", **{key: factor * sheet})
+    said = remarks_at(eager, "joint left_knee")
+    assert (
+        f"warning: joint left_knee: its {key} is {factor * sheet:.4g} {unit}, its AX-12A has {sheet:.3g}"
+        in said
+    )
+    at_14 = replace(eager, servos={**eager.servos, "voltage": 12.0 * factor})
+    assert "AX-12A" not in remarks_at(at_14, "joint left_knee")
+    assert "AX-12A" not in remarks_at(replace(eager, servos={}), "joint left_knee")
+
+
+@pytest.mark.parametrize("degrees", [13, 45, 130, 180, 360])
+def test_limits_in_degrees_are_warnings_and_those_of_a_joint_that_turns_twice_are_not(robot, degrees):
+    forgotten = with_joint(robot, "left_hip_yaw", lower=-float(degrees), upper=float(degrees))
+    assert "warning: joint left_hip_yaw: its limits are" in remarks_at(forgotten, "joint left_hip_yaw")
+    for limit in (math.radians(degrees), 2 * math.pi):
+        meant = with_joint(robot, "left_hip_yaw", lower=-limit, upper=limit)
+        assert "warning" not in remarks_at(meant, "joint left_hip_yaw")
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_bracket_whose_axes_cross_has_no_size_to_compare_its_inertia_with(robot, seed):
+    """Two servos back to back: the axes meet, the CoM lies beside them, and no shape says how large it is."""
+    rng = np.random.default_rng(seed)
+    name, size = "right_hip_roll_link", rng.uniform(0.01, 0.05)
+    link = robot.link(name)
+    axes = [joint for joint in robot.joints if name in (joint.parent, joint.child)]
+    point = axes[0].screw.s0
+    for joint, s in zip(axes, ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), strict=False):
+        screw = replace(joint.screw, s=Vector(*s), s0=point)
+        robot = with_joint(robot, joint.name, screw=screw)
+    com = point + Vector(*rng.uniform(-0.02, 0.02, 3).tolist())
+    moment = float(link.mass) * size**2
+    bare = {"boxes": (), "shapes": (), "com": com}
+    bracket = with_link(robot, name, inertia=Inertia(moment, moment, moment), **bare)
+    assert "gyration" not in remarks_at(bracket, f"link {name}")
+    assert "outside" not in remarks_at(bracket, f"link {name}")
