@@ -21,12 +21,12 @@ from screwkin.anatomy import findings
 from screwkin.anatomy.arms import arm_chains, arm_pairs
 from screwkin.anatomy.footing import LEVEL, Footing, footings
 from screwkin.anatomy.forward import Forward, forward_of
-from screwkin.anatomy.limbs import AnatomyError, Standing, root_of, standing_of
+from screwkin.anatomy.limbs import AnatomyError, Standing, band_of, root_of, standing_of
 from screwkin.anatomy.outline import Outline
 from screwkin.anatomy.postures import Legs, home_of
 from screwkin.anatomy.record import Anatomy
 from screwkin.anatomy.skeleton import Skeleton
-from screwkin.anatomy.soles import FootShape, band_of, feet_of
+from screwkin.anatomy.soles import FootShape, feet_of
 from screwkin.anatomy.symmetry import TILT, Symmetry, symmetry_of
 from screwkin.anatomy.turned import seen_from
 from screwkin.anatomy.written import commented_table

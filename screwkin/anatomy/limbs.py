@@ -8,12 +8,13 @@ along which all of this fits best.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from screwkin.algebra.arrays import Array
+from screwkin.anatomy.facets import facet_below
 from screwkin.anatomy.outline import Outline
 from screwkin.anatomy.skeleton import Skeleton
 from screwkin.anatomy.symmetry import TILT, Symmetry
@@ -30,8 +31,6 @@ SPLAYED = 45.0
 """Greatest angle between a leg and the vertical in the zero pose [deg]: beyond, it does not reach down."""
 TOPPLED = 40.0
 """Greatest angle between the way from the feet to the CoM and the vertical in the zero pose [deg]."""
-
-
 CLEAR = 0.3
 """Share of a leg's length that the trunk is clear of the floor: legs carry it, arms hang beside it."""
 NEARBY = 0.5
@@ -42,6 +41,8 @@ ON_TRUNK = 30.0
 """What counts against a direction in which the trunk is lowest [deg]: what lies on its back stands too."""
 UNUSUAL = (2.0, 5.0)
 """Factor and addend [deg] for directions that are not the base frame's z, which is up by convention."""
+BAND = (0.001, 0.005)
+"""Points that close to a plane [m], and by the leg's length, are in it."""
 
 
 class AnatomyError(InputError):
@@ -81,6 +82,11 @@ class Standing:
     splay: float
     trunk: tuple[str, ...]
     hangs: float
+
+
+def band_of(stance: Standing) -> float:
+    """Distance from a sole's plane within which points count as in it [m]."""
+    return BAND[0] + BAND[1] * stance.length
 
 
 def pairs_of(skeleton: Skeleton, symmetry: Symmetry) -> tuple[Pair, ...]:
@@ -142,12 +148,45 @@ def standing_of(skeleton: Skeleton, symmetry: Symmetry, outline: Outline) -> Sta
         return np.concatenate([outline.of(n for n in names if n not in bare), outline.roughly(bare)])
 
     tried = [_standing(skeleton, symmetry, surface, pairs, up) for up in _upward(skeleton, symmetry)]
+    tried = [stance for stance in tried if not _on_hands(skeleton, outline, stance, tried)]
     first = min(tried, key=_unlikely)
     near = first.low + NEARBY * abs(first.length)
     looked_at |= {n for n in of_limbs if (outline.roughly([n]) @ first.up).min() <= near}
     best = _standing(skeleton, symmetry, surface, pairs, first.up)
     _refuse_other_floors(skeleton, surface, best)
     return best
+
+
+def _on_hands(skeleton: Skeleton, outline: Outline, stance: Standing, tried: Sequence[Standing]) -> bool:
+    """Whether a direction is that of a handstand: turned over, the body stands on what are rather its legs.
+
+    Where arms point up in the pose that is called zero, a body could stand on either pair. Legs carry all the
+    rest, arms what they lift: legs are heavier and end in larger facets. Both signs must agree.
+    """
+    over = next((other for other in tried if other.up @ stance.up < TILT - 1), None)
+    if over is None or over.legs is stance.legs or not (_stands(stance) and _stands(over)):
+        return False
+    masses = [
+        sum(float(skeleton.robot.link(n).mass) for n in _links(skeleton, s.legs)) for s in (stance, over)
+    ]
+    return masses[0] < masses[1] and _area(skeleton, outline, stance) < _area(skeleton, outline, over)
+
+
+def _stands(stance: Standing) -> bool:
+    """Whether a body can stand so on two limbs."""
+    upright = stance.splay <= SPLAYED and stance.lean <= TOPPLED and stance.hangs <= HANGS
+    return stance.length > 0 and upright and not stance.trunk
+
+
+def _area(skeleton: Skeleton, outline: Outline, stance: Standing) -> float:
+    """Area of the largest facets that look down, at the ends of the limbs that a body stands on [m^2]."""
+    total = 0.0
+    for root in (stance.legs.one, stance.legs.other):
+        links = skeleton.links_beyond(root)
+        heights = {name: float((outline.roughly([name]) @ stance.up).min()) for name in links}
+        points = outline.of(n for n in links if heights[n] <= min(heights.values()) + NEARBY * stance.length)
+        total += facet_below(points, stance.up, band_of(stance)).area if len(points) else 0.0
+    return total
 
 
 def _unlikely(stance: Standing) -> float:

@@ -20,13 +20,11 @@ from screwkin.anatomy.facets import (
     facet_below,
     hull_of,
 )
-from screwkin.anatomy.limbs import AnatomyError, Standing
+from screwkin.anatomy.limbs import AnatomyError, Standing, band_of
 from screwkin.anatomy.outline import Outline
 from screwkin.anatomy.skeleton import Skeleton
 from screwkin.anatomy.symmetry import Symmetry
 
-BAND = (0.001, 0.005)
-"""Points that close to a plane [m], and by the leg's length, are in it."""
 CARRIES = 0.25
 """Share of a sole that a link must have of its own to be the foot; else the foot is what it carries."""
 
@@ -107,11 +105,6 @@ def _foot(skeleton: Skeleton, stance: Standing, outline: Outline, root: int) -> 
             break
         foot = higher
     return foot
-
-
-def band_of(stance: Standing) -> float:
-    """Distance from a sole's plane within which points count as in it [m]."""
-    return BAND[0] + BAND[1] * stance.length
 
 
 def _standing(skeleton: Skeleton, stance: Standing, outline: Outline, root: int, last: int) -> FootShape:

@@ -47,13 +47,23 @@ class Body:
             f'<limit lower="{limits[0]}" upper="{limits[1]}" effort="100" velocity="10"/></joint>'
         )
 
-    def chain(self, names: Sequence[str], root: int, y: float, bends: tuple[float, float] = (0, 0)) -> int:
-        """Joints one below the other; the last link's number."""
+    def chain(
+        self,
+        names: Sequence[str],
+        root: int,
+        y: float,
+        bends: tuple[float, float] = (0, 0),
+        raised: bool = False,
+        mass: float = 0.5,
+    ) -> int:
+        """Joints one below the other, or raised, above; the last link's number."""
         parent = root
+        top, sense = HEIGHTS[names[0].rpartition("_")[0]] if names else 0.0, -1 if raised else 1
         for name in names:
             place, _, axis = name.rpartition("_")
-            at = (0.0, y, HEIGHTS[place])
-            child = self.link(at, 0.5, (0.0, y, HEIGHTS[place] - 0.03))
+            z = top + sense * (HEIGHTS[place] - top)
+            at = (0.0, y, z)
+            child = self.link(at, mass, (0.0, y, z - sense * 0.03))
             limits = bends if place == "knee" and bends != (0, 0) else (-2.5, 2.5)
             self.joint(parent, child, axis, limits)
             parent = child
@@ -92,6 +102,10 @@ def biped(
     bends: tuple[float, float] = (0, 0),
     hips: Sequence[float] = (0.0,),
     ahead: float = AHEAD,
+    raised: bool = False,
+    hand: float = 0.0,
+    lean: float = 0.0,
+    arm_mass: float = 0.5,
 ) -> Body:
     """A body with legs, and arms unless they have no joints.
 
@@ -107,6 +121,10 @@ def biped(
         bends: limits of the knees.
         hips: places of pairs of legs along x.
         ahead: how far the middle of a sole lies ahead of the ankle [m].
+        raised: arms point up.
+        hand: edge of a cube at the end of every arm [m], none if 0.
+        lean: how far the feet are ahead of the hips [m].
+        arm_mass: of every link of an arm [kg].
     """
     body = Body()
     pelvis = body.link((0, 0, 0), 4.0, (0, 0, 0.1), box((0, 0, 0.08), (0.12, 0.16, 0.1)))
@@ -122,10 +140,14 @@ def biped(
             before = len(body.places)
             end = body.chain(leg, pelvis, side * HIP_Y, bends)
             _foot(body, end, side, foot, tilt if side < 0 else 0.0, toe, ahead)
-            if x:
-                _shift(body, before, x)
+            if x + lean:
+                _shift(body, before, x + lean)
     for side in (-1, 1) if arm else ():
-        end = body.chain(arm, chest, side * SHOULDER_Y)
+        end = body.chain(arm, chest, side * SHOULDER_Y, raised=raised, mass=arm_mass)
+        if hand:
+            _, y, z = body.places[end]
+            at = (0.0, y, z + (0.1 if raised else -0.1))
+            body.joint(end, body.link(at, 0.1, at, box((0, 0, 0), (hand, hand, hand))), "")
         for k in range(fingers):
             parent = end
             for z in (-0.12, -0.15):

@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from screwkin.algebra.se3 import as_array
 from screwkin.anatomy.humanoid import anatomy
@@ -149,6 +150,31 @@ def test_a_body_without_feet_hung_between_arms_has_no_legs():
     """Arms that reach lower than the trunk are still arms: the trunk hangs between them."""
     with pytest.raises(AnatomyError, match=r"not on two legs|hangs between"):
         found(leg=(), arm=(*ARM, "wrist_pitch", "wrist_roll"))
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_a_body_whose_arms_point_up_stands_on_its_legs(seed):
+    """Turned over it could stand on its hands, where these lie better below the CoM than the feet."""
+    rng = np.random.default_rng(seed)
+    about = {
+        "arm": (*ARM, "wrist_pitch", "wrist_roll")[: rng.integers(3, 6)],
+        "raised": True,
+        "hand": rng.uniform(0.02, 0.09),
+        "lean": rng.uniform(0.05, 0.2) * rng.choice([-1, 1]),
+        "arm_mass": rng.uniform(0.1, 0.5),
+        "neck": bool(rng.integers(2)),
+        "waist": str(rng.choice(["", "yaw"])),
+    }
+    turn = Rotation.random(rng=rng).as_euler("xyz") if seed % 2 else (0, 0, rng.uniform(-np.pi, np.pi))
+    body = biped(**about)
+    robot = anatomy(parse_urdf(body.text(" ".join(map(str, turn)))).robot).robot
+    feet = {robot.tree[robot.path_to(limb.link)[0]].child for limb in robot.limbs if limb.kind == "leg"}
+    roots = {
+        line.split('child link="')[1].split('"')[0] for line in body.joints if 'parent link="part0"' in line
+    }
+    assert feet <= roots
+    assert {len(robot.path_to(limb.link)) for limb in robot.limbs[:2]} == {6}
+    np.testing.assert_allclose(size_of_sole(robot), (0.2, 0.1), atol=1e-6)
 
 
 def test_the_sole_lies_where_the_plate_is():
