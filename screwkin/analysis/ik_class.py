@@ -9,7 +9,7 @@ import numpy as np
 
 from screwkin.algebra.se3 import as_array
 from screwkin.errors import InputError
-from screwkin.ik.all_branches import by_relative, has_branches
+from screwkin.ik.all_branches import by_relative, has_branches, of_six
 from screwkin.ik.branches import certified_solutions
 from screwkin.ik.closed import recognised
 from screwkin.ik.elimination import BRANCHES
@@ -65,7 +65,7 @@ def _class_of(robot: Robot, limb: str) -> IkClass:
     except InputError as error:
         return IkClass(limb, "pose", str(error), 0, float("nan"), 0)
     position = len(chain.joints) <= 3
-    family, branches = _family(chain, position)
+    family, branches = family_of(chain, position)
     low, high = box(chain)
     q = low + spread(len(chain.joints), POSES, 0) * (high - low)
     if linked:
@@ -86,7 +86,7 @@ def _class_of(robot: Robot, limb: str) -> IkClass:
     return IkClass(limb, "position" if position else "pose", family, branches, solved, poses)
 
 
-def _family(chain: SerialChain, position: bool) -> tuple[str, int]:
+def family_of(chain: SerialChain, position: bool = False) -> tuple[str, int]:
     """How a limb is solved, and with how many branches."""
     form = recognised(chain, position)
     if form is not None:
@@ -94,9 +94,10 @@ def _family(chain: SerialChain, position: bool) -> tuple[str, int]:
         walked = ", from the tip" if form.backwards else ""
         return f"closed form: {form.family}{walked}", form.branches(some).shape[1]
     if not position and has_branches(chain):
+        free = "" if of_six(chain) is chain else ", tip free"
         if not by_relative(chain):
-            return "no special geometry: elimination", BRANCHES
-        near = relative(chain)
+            return f"no special geometry: elimination{free}", BRANCHES
+        near = relative(of_six(chain))
         assert near is not None
-        return f"{near.family} but for rounding: the nearest closed form, polished", BRANCHES
+        return f"{near.family}{free} but for rounding: the nearest closed form, polished", BRANCHES
     return "numeric: Newton's method, further starts", 1

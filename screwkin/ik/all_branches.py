@@ -1,4 +1,4 @@
-"""All branches of six revolute joints without closed form.
+"""All branches of revolute joints without closed form: six, or four and five whose tip is free to turn.
 
 Those of the nearest limb that has one, where the axes are parallel or meet but for tolerance, else those
 of an elimination; Newton's method on the limb itself makes them exact.
@@ -6,13 +6,15 @@ of an elimination; Newton's method on the limb itself makes them exact.
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 
 from screwkin.algebra.arrays import Array, Integers
 from screwkin.compiler.program import Program, Recorder
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.compiler.run import run
-from screwkin.ik.closed import EXACT, SAME, first_of_its_kind
+from screwkin.ik.closed import EXACT, SAME, conditioned, first_of_its_kind, refined
 from screwkin.ik.eliminated import Candidates, eliminated, elimination, elimination_programs, exact
 from screwkin.ik.elimination import BRANCHES
 from screwkin.ik.on_limits import on_limits
@@ -23,18 +25,37 @@ from screwkin.ik.solutions import KINDS, LimbSolutions, ordered
 from screwkin.kinematics.serial_chain import SerialChain, per_chain
 from screwkin.model.records import LIMIT_TOLERANCE
 
+STEPS = 4
+"""Newton steps of four and five joints from where those of six rest."""
+CLEAR = 1e-7
+"""Slack of a relative's branches below which rounding decides about them: there its arrays serve."""
 APART = 10 * SAME
 """Difference of two branches' keys below which they may be one: that of six angles ``SAME`` apart is less."""
 
 
 def has_branches(chain: SerialChain) -> bool:
     """True if all branches of the limb can be computed, though it has no closed form."""
-    return relative(chain) is not None or elimination(chain) is not None
+    whole = of_six(chain)
+    return relative(whole) is not None or elimination(whole) is not None
 
 
 def by_relative(chain: SerialChain) -> bool:
     """True if elimination is not exact, and the limb has a relative with a closed form."""
-    return not exact(chain) and relative(chain) is not None
+    whole = of_six(chain)
+    return not exact(whole) and relative(whole) is not None
+
+
+@per_chain
+def of_six(chain: SerialChain) -> SerialChain:
+    """The limb, one of four or five joints with a tip that is free to turn about its own axes.
+
+    Of these axes those are taken about which the six joints are best conditioned, as of closed forms.
+    """
+    missing = 6 - len(chain.screws)
+    if missing not in (1, 2) or not chain.turning.all():
+        return chain
+    freed = [chain.freed(free, range(missing)) for free in combinations(("rx", "ry", "rz"), missing)]
+    return max((whole for whole in freed if has_branches(whole)), key=conditioned, default=chain)
 
 
 def branch_solutions(
@@ -45,10 +66,12 @@ def branch_solutions(
     Args:
         chain: of the limb.
         target: exact poses of the tip (B, 4, 4).
-        guess: (B, 6).
+        guess: (B, n).
         tolerances: angle [rad] and distance [m] within which limits are preferred to an exact solution.
         batch: shape with B samples.
     """
+    if len(chain.screws) < 6:
+        return _with_held_tip(chain, target, guess, tolerances, batch)
     if by_relative(chain):
         return careful_solutions(chain, *_near_relative(chain, target), target, guess, tolerances, batch)
     found = eliminated(chain, target, guess)
@@ -66,6 +89,31 @@ def branch_solutions(
             whole, some = getattr(solutions, name), getattr(part, name)
             whole.reshape(len(target), *some.shape[1:])[at] = some
     return solutions
+
+
+def _with_held_tip(
+    chain: SerialChain, target: Array, guess: Array, tolerances: tuple[float, float], batch: tuple[int, ...]
+) -> LimbSolutions:
+    """The solutions of four or five joints: those of six where the last, which turn the tip, rest."""
+    own, count = len(chain.screws), len(target)
+    start = np.concatenate([guess, np.zeros((count, 6 - own))], axis=1)
+    found = branch_solutions(of_six(chain), target, start, (0.0, 0.0), (count,))
+    q, error = refined(chain, np.nan_to_num(found.q[..., :own]), target, STEPS)
+    for k in range(q.shape[1]):
+        q[:, k] = np.where(error[:, k, None] <= EXACT, on_limits(chain, q[:, k], target, tolerances), q[:, k])
+    valid = first_of_its_kind(q, error)
+    return _certified(chain, q, error, valid, guess, batch)
+
+
+def _certified(
+    chain: SerialChain, q: Array, error: Array, valid: Array, guess: Array, batch: tuple[int, ...]
+) -> LimbSolutions:
+    """Branches in order; where none is a solution, the nearest one first."""
+    lost = np.flatnonzero(~valid.any(axis=1))
+    k = error[lost].argmin(axis=1)
+    q[lost, 0], error[lost, 0] = q[lost, k], error[lost, k]
+    once = np.ones(valid.shape, dtype=int)
+    return ordered(chain, "branches", q, valid, error, once, guess, batch)
 
 
 def _at_once(
@@ -129,21 +177,29 @@ def careful_solutions(
     if max(tolerances) > LIMIT_TOLERANCE:
         owner, k = (error <= EXACT).nonzero()
         q[owner, k] = on_limits(chain, q[owner, k], target[owner], tolerances)
-    valid = first_of_its_kind(q, error)
-    lost = np.flatnonzero(~valid.any(axis=1))
-    k = error[lost].argmin(axis=1)
-    q[lost, 0], error[lost, 0] = q[lost, k], error[lost, k]
-    once = np.ones(valid.shape, dtype=int)
-    return ordered(chain, "branches", q, valid, error, once, guess, batch)
+    return _certified(chain, q, error, first_of_its_kind(q, error), guess, batch)
 
 
 def _near_relative(chain: SerialChain, target: Array) -> tuple[Array, Array]:
-    """Branches (B, 16, 6) next to those of the limb's relative, and their error (B, 16)."""
+    """Branches (B, 16, 6) next to those of the limb's relative, and their error (B, 16).
+
+    Where rounding decides about these, and where they lead nowhere, those over arrays are taken.
+    """
     out = run(relative_branches(chain), {"target": target})
-    near = out["q"]
+    q, error = _next_to(chain, out["q"], out["slack"], target)
+    unclear = (np.abs(out["slack"]) < CLEAR).any(axis=1) | ~(error <= EXACT).any(axis=1)
+    again, form = np.flatnonzero(unclear), relative(chain)
+    if len(again) and form is not None:
+        near, slack = form.branches(target[again]), np.zeros((len(again), out["slack"].shape[1]))
+        q[again], error[again] = _next_to(chain, near, slack, target[again])
+    return q, error
+
+
+def _next_to(chain: SerialChain, near: Array, slack: Array, target: Array) -> tuple[Array, Array]:
+    """What Newton steps make of a relative's branches (B, k, 6), and of both sides of nearly folded ones."""
     count, k = near.shape[:2]
     starts, present = np.tile(near, (1, 3, 1)), np.ones((count, 3 * k), dtype=bool)
-    folds = out["slack"] < FOLD
+    folds = slack < FOLD
     present[:, k:] = np.tile(folds, 2)
     sample, row = folds.nonzero()
     ahead, back = both_sides(chain, near[sample, row], target[sample])
@@ -152,6 +208,9 @@ def _near_relative(chain: SerialChain, target: Array) -> tuple[Array, Array]:
     sample, row = (present & np.isfinite(starts).all(axis=2)).nonzero()
     polished = run(steps(chain), {"start": starts[sample, row], "target": target[sample]})
     q[sample, row], error[sample, row] = polished["q"], polished["error"][:, 0]
+    crowded = np.flatnonzero((error < NEAR).sum(axis=1) > BRANCHES)
+    again = (error[crowded] <= EXACT) & ~first_of_its_kind(chain.wrapped(q[crowded]), error[crowded])
+    error[crowded] = np.where(again, np.inf, error[crowded])
     first = np.argsort(error, axis=1, kind="stable")[:, :BRANCHES]
     return np.take_along_axis(q, first[..., None], axis=1), np.take_along_axis(error, first, axis=1)
 
@@ -174,5 +233,6 @@ def relative_branches(chain: SerialChain) -> Program:
 
 def branch_programs(chain: SerialChain) -> list[Program]:
     """What ``branch_solutions`` runs for a limb."""
+    chain = of_six(chain)
     own = [relative_branches(chain)] if by_relative(chain) else elimination_programs(chain)
     return [*own, steps(chain)]

@@ -134,10 +134,8 @@ def _with_free_tip(chain: SerialChain, family: str | None) -> ClosedForm:
     n, forms, faults = len(chain.screws), [], []
     for free in combinations(("rx", "ry", "rz"), 6 - n):
         longer = chain.freed(free, range(6 - n))
-        low, high = box(longer)
-        size = volume(longer, low + spread(6, POSITIONS, 0) * (high - low)).mean()
         try:
-            forms.append((float(size), closed_form(longer, family=family)))
+            forms.append((conditioned(longer), closed_form(longer, family=family)))
         except InputError as error:
             faults.append(str(error))
     if not forms:
@@ -153,6 +151,12 @@ def _with_free_tip(chain: SerialChain, family: str | None) -> ClosedForm:
 
     formulas = Formulas(lambda D: [still(branch) for branch in form.at(D)], arrays)
     return ClosedForm(chain, f"{form.family}, tip free", False, False, formulas)
+
+
+def conditioned(chain: SerialChain) -> float:
+    """How well six joints are conditioned, mostly: mean volume of their screws within the limits."""
+    low, high = box(chain)
+    return float(volume(chain, low + spread(6, POSITIONS, 0) * (high - low)).mean())
 
 
 @per_chain
@@ -194,7 +198,7 @@ def _solved_block(
     form: ClosedForm, target: Array, guess: Array, least_squares: bool
 ) -> tuple[Array, Array, Array]:
     """The solutions of a few samples, see ``solve_closed``."""
-    q, error = _refined(form.chain, form.branches(target), target)
+    q, error = refined(form.chain, form.branches(target), target)
     valid = first_of_its_kind(q, error)
     lost = np.flatnonzero(~valid.any(axis=1))
     if len(lost):
@@ -231,7 +235,7 @@ def nearest(chain: SerialChain, q: Array, target: Array) -> Array:
     return newton(lack, q, tolerance=1e-15).x
 
 
-def _refined(chain: SerialChain, q: Array, target: Array, steps: int = 2) -> tuple[Array, Array]:
+def refined(chain: SerialChain, q: Array, target: Array, steps: int = 2) -> tuple[Array, Array]:
     """Branches (B, k, n) after Newton steps where rounding has left too much; and their errors (B, k).
 
     Near a singular position a closed form loses digits, as an arc cosine near 1 does; two steps on the whole

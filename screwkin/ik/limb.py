@@ -46,8 +46,8 @@ def limb_ik(
         T_base_tip: wanted poses of the tip in the base frame (..., 4, 4) [m]; or positions (..., 3) with the
             orientation free.
         method: ``"closed"``, exact and with all branches, for limbs whose screw table allows it;
-            ``"branches"``, all of them for six revolute joints of any geometry; numeric from the guess:
-            ``"newton"``, ``"lm"`` (Levenberg-Marquardt), ``"dls"`` (damped least squares), ``"pinv"``
+            ``"branches"``, all of them for four to six revolute joints of any geometry; numeric from the
+            guess: ``"newton"``, ``"lm"`` (Levenberg-Marquardt), ``"dls"`` (damped least squares), ``"pinv"``
             (pseudoinverse); ``"hybrid"``: numeric from the solution of a similar limb with a spherical hip;
             ``"auto"``: closed where possible, else branches, else newton.
         guess: positions (..., n) of the limb's joints [rad or m]; default: those of posture ``home``, without

@@ -59,8 +59,8 @@ def _chosen(chain: SerialChain, method: Method, position: bool) -> Chosen:
         return "branches" if not position and has_branches(chain) else "newton"
     if method == "branches" and (position or not has_branches(chain)):
         raise InputError(
-            f"{chain.limb} has no branches that can be computed: poses (..., 4, 4) and six revolute"
-            " joints in general places are needed. Use a numeric method"
+            f"{chain.limb} has no branches that can be computed: poses (..., 4, 4) and four to"
+            " six revolute joints in general places are needed. Use a numeric method"
         )
     if method == "closed" and not recognised(chain, position):
         if position:

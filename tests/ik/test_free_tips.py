@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import jax.numpy as jnp
@@ -15,14 +16,16 @@ from screwkin.errors import InputError, UnknownNameError
 from screwkin.ik.closed import closed_form
 from screwkin.ik.methods import solve_limb
 from screwkin.ik.numeric import IkSettings
-from screwkin.kinematics.serial_chain import SerialChain, forward
+from screwkin.kinematics.serial_chain import SerialChain, forward, residual
 from screwkin.kinematics.status import Status
 from screwkin.mechanism.followers import followers
 from screwkin.model.robot import Robot
 from screwkin.model.table import parse_robot
 from tests.bodies import LEG, humanoid
-from tests.ik.legs import apart, offset_leg, random_tip, spherical_leg, unit
+from tests.ik.legs import Leg, apart, offset_leg, random_tip, spherical_leg, unit
 
+REGULAR = 1e-3
+"""Inverse condition number below which branches nearly fall together."""
 LEGS = {"no yaw": LEG[1:], "no ankle roll": LEG[:-1], "neither": LEG[1:-1]}
 
 
@@ -74,6 +77,59 @@ def test_three_parallel_axes_and_two_others_have_a_closed_form(kind: str, seed: 
     assert solved.method == "closed"
     assert np.nanmin(apart(solved.q, q[:, None]), axis=1).max() < 1e-6
     assert solved.residual[solved.valid].max() < 1e-11
+
+
+def rounded_leg(seed: int, size: float) -> SerialChain:
+    """Roll, yaw and three pitches, as a table that was rounded holds them: axes turned and moved a little."""
+    rng = np.random.default_rng(seed)
+    axes = np.array([[-1, 0, 0], [0, 0, -1], [0, 1, 0], [0, -1, 0], [0, 1, 0]], dtype=float)
+    axes *= rng.choice([-1.0, 1.0], size=(5, 1))
+    y, thigh, shank = rng.uniform((0.03, 0.1, 0.1), (0.1, 0.4, 0.4))
+    points = np.array([[0, 0, 0], [0, y, -0.1 * thigh], [0, y, -0.1 * thigh], [0, y, -thigh], [0, y, -thigh]])
+    points[4:, 2] -= shank
+    tip = np.eye(4)
+    tip[:3, 3] = points[4] - [0, 0, 0.04]
+    axes += size * rng.normal(size=(5, 3))
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    return Leg(axes, points + 0.2 * size * rng.normal(size=(5, 3)), tip).chain()
+
+
+def general_leg(seed: int) -> SerialChain:
+    rng = np.random.default_rng(seed)
+    return Leg(unit(rng, 5), 0.3 * rng.normal(size=(5, 3)), random_tip(rng)).chain()
+
+
+def assert_own_poses_are_solved(chain: SerialChain, seed: int, free: tuple[str, ...], count: int) -> None:
+    """Poses of a limb's own within limits as legs have: all are solved, with the branch that made them."""
+    low, high = np.array([-0.6, -1.3, -1.8, -2.3, -0.8]), np.array([0.6, 1.3, 1.8, 2.3, 0.8])
+    chain = replace(chain, lower=low, upper=high)
+    q = np.random.default_rng([seed, 1]).uniform(low, high, (count, 5))
+    T = as_array(forward(chain.screws, unstack(q), chain.tip)[0], (count,))
+    longer = chain.freed(free, range(5, 5 + len(free)))
+    start = np.zeros((count, 5 + len(free)))
+    solved = solve_limb(longer, T, "auto", start, IkSettings(), (count,))
+    assert solved.method == "branches"
+    sizes = np.linalg.svd(residual(longer, np.c_[q, start[:, 5:]], T)[1], compute_uv=False)
+    regular = sizes[:, -1] > REGULAR * sizes[:, 0]
+    assert regular.mean() > 0.98
+    assert solved.in_limits.any(axis=1)[regular].all()
+    assert solved.residual[solved.valid].max() < 1e-9
+    assert np.nanmin(apart(solved.q[..., :5], q[:, None]), axis=1)[regular].max() < 1e-5
+
+
+@pytest.mark.parametrize("free", [(), ("rx",)], ids=["pose", "lean free"])
+@pytest.mark.parametrize("size", [4e-6, 1e-7])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 20))])
+def test_rounded_legs_of_five_joints_find_their_own_poses(
+    seed: int, size: float, free: tuple[str, ...]
+) -> None:
+    """Where the tip's free axis lies in the plane of the hip's, roots of the relative fall together."""
+    assert_own_poses_are_solved(rounded_leg(seed, size), seed, free, 400)
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 20))])
+def test_legs_of_five_joints_of_any_geometry_find_their_own_poses(seed: int) -> None:
+    assert_own_poses_are_solved(general_leg(seed), seed, (), 400)
 
 
 @pytest.mark.parametrize("name", LEGS)
