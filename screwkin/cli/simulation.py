@@ -89,7 +89,7 @@ def simulate_to_files(account: Account, folder: Path, verdict: Path, wish: Wish)
         file.write(json.dumps(plain(data), indent=2, allow_nan=False) + "\n")
     film = None
     if camera is not None and check.pictures:
-        film = save_gif(folder / FILM, check.pictures, trajectory.duration / (camera.pictures - 1))
+        film = save_gif(folder / FILM, check.pictures, trajectory.duration)
     more = wish.more(check)
     if wish.plots:
         with progress_bar("pictures") as done:

@@ -47,7 +47,7 @@ def view(
     """See a robot, a mechanism or a motion in the browser: joints to drag, a gait to tune, time to scrub.
 
     Prints the address to open and shows it until Ctrl-C. From another computer: ssh -L 8080:localhost:8080
-    HOST, then open the same address there. Needs viser: pip install "screwkin[viewer]".
+    HOST, then open the same address there. Needs viser: pip install viser.
     """
     if film is not None:
         check_film(film)

@@ -10,7 +10,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.campaign.outcome import Outcome
 from screwkin.campaign.plan import Campaign
 from screwkin.campaign.statistics import Tally, tally
-from screwkin.report.style import MEASURED, PLAIN, ZMP, Axes, Figure, new_figure
+from screwkin.report.style import MEASURED, PLAIN, ZMP, Axes, Figure, new_figure, titled
 
 Grid = Sequence[Sequence[Tally]]
 
@@ -60,8 +60,7 @@ def _curves(campaign: Campaign, across: str, tallies: Sequence[Tally]) -> Figure
     margin.axhline(0.0, color=PLAIN, linewidth=0.8)
     margin.set_ylabel("least planned margin [mm]")
     _label(margin, across, values, x)
-    figure.suptitle(_title(campaign, "falls with 95 % intervals, and the plan's margin"), fontsize=10.5)
-    return figure
+    return titled(figure, 2, _title(campaign, "falls with 95 % intervals, and the plan's margin"))
 
 
 def _maps(campaign: Campaign, across: str, up: str, grid: Grid) -> Figure:

@@ -25,6 +25,8 @@ LINES = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (1, 1)))
 WIDTH, DPI = 8.4, 130
 LEFT, RIGHT, BOTTOM, TOP, BETWEEN = 0.78, 0.14, 0.47, 0.16, 0.16
 """Margins of stacked axes and what is between them [inch]: numbers and a label fit, none needs measuring."""
+TITLE = 0.24
+"""Height of a line of title [inch]."""
 ROW, HANDLE, LETTER = 0.21, 0.57, 0.06
 """Height of a legend's row; width of an entry without its label, and of a label's letter [inch]."""
 
@@ -89,6 +91,13 @@ def _leave_above(figure: Figure, rows: int, space: float) -> None:
     height = figure.get_figheight()
     mean = (height - space - BOTTOM - (rows - 1) * BETWEEN) / rows
     figure.subplots_adjust(top=1 - space / height, hspace=BETWEEN / mean)
+
+
+def titled(figure: Figure, rows: int, title: str) -> Figure:
+    """Stacked axes with a title above them, which covers none."""
+    _leave_above(figure, rows, TOP + TITLE)
+    figure.suptitle(title, fontsize=10.5, y=1 - TOP / 2 / figure.get_figheight())
+    return figure
 
 
 def save_figure(figure: Figure, path: Path) -> Path:

@@ -86,9 +86,10 @@ def following(time: Array, base: Array) -> Array:
 
 
 def save_gif(path: str | Path, frames: Sequence[Picture], seconds: float) -> Path:
-    """An endless animated GIF that shows every picture for so many seconds.
+    """An endless animated GIF of so many seconds, its pictures taken from begin to end at even times.
 
-    All pictures share one palette and only what changes is stored, so it is small and does not flicker.
+    Each is shown until midway to the next, in whole hundredths of a second, whose sum is the film's. All
+    share one palette and only what changes is stored, so it is small and does not flicker.
 
     Raises:
         OutputError: it cannot be written.
@@ -104,10 +105,17 @@ def save_gif(path: str | Path, frames: Sequence[Picture], seconds: float) -> Pat
             format="GIF",
             save_all=True,
             append_images=mapped[1:],
-            duration=round(1000 * seconds),
+            duration=_milliseconds(len(frames), seconds),
             loop=0,
         )
     return Path(path)
+
+
+def _milliseconds(pictures: int, seconds: float) -> list[int]:
+    """How long each of several pictures is shown [ms], whole hundredths of a second, of a film so long."""
+    changes = [0.0, *((k + 0.5) / (pictures - 1) for k in range(pictures - 1)), 1.0]
+    hundredths = np.round(100 * seconds * np.array(changes)).astype(int)
+    return [10 * max(1, int(step)) for step in np.diff(hundredths)]
 
 
 def save_png(path: str | Path, picture: Picture) -> Path:

@@ -43,4 +43,4 @@ def write_film(robot: Robot, track: Track, path: Path, camera: Camera | None = N
     camera = camera or Camera(pictures=count)
     at = [track.sample(time) for time in np.linspace(0.0, track.duration, camera.pictures)]
     shots = pictures(robot, track.time[at], track.T_world_base[at], track.q[at], camera, track.terrain)
-    return save_gif(path, shots, track.duration / max(camera.pictures - 1, 1))
+    return save_gif(path, shots, track.duration)

@@ -9,7 +9,7 @@ from screwkin.algebra.se3 import as_array
 from screwkin.errors import InputError
 from screwkin.report import balance, frames, motion, simulation
 from screwkin.report.pictures import save_pictures
-from screwkin.report.style import save_figure, spans, styled
+from screwkin.report.style import new_figure, save_figure, spans, styled, titled
 
 
 @pytest.fixture(scope="module")
@@ -213,3 +213,17 @@ def test_spans_are_runs_of_true():
     assert spans([False, True, True, False, True]) == [(1, 3), (4, 4)]
     assert spans([True, True]) == [(0, 1)]
     assert spans([False]) == []
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3])
+@pytest.mark.parametrize("height", [3.0, 4.6, 9.0])
+def test_a_title_above_stacked_axes_covers_none_of_them_and_is_not_cut_off(rows, height):
+    """Boxes as they are drawn do not meet."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    figure, _ = new_figure(height, rows)
+    titled(figure, rows, "a gait: falls with 95 % intervals, and the plan's margin")
+    draw = FigureCanvasAgg(figure).get_renderer()
+    box = figure.get_suptitle() and figure.texts[0].get_window_extent(draw)
+    assert all(not box.overlaps(axis.get_window_extent(draw)) for axis in figure.axes)
+    assert box.y1 <= figure.bbox.y1

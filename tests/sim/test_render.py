@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from PIL import Image
 
 import screwkin as sk
@@ -17,7 +19,7 @@ from screwkin.model.records import Shape
 from screwkin.model.robot import Box, Link, Robot
 from screwkin.model.shapes import box_points
 from screwkin.model.urdf import ORANGE, SLATE, WHITE
-from screwkin.sim.camera import Camera, Picture, following, save_gif, save_png, view_of
+from screwkin.sim.camera import Camera, Picture, _milliseconds, following, save_gif, save_png, view_of
 from screwkin.sim.render import pictures
 from screwkin.sim.triangles import draw_triangles
 
@@ -187,15 +189,30 @@ def test_a_film_is_an_endless_gif_of_all_its_pictures(robot: Robot, tmp_path: Pa
     T = np.tile(home.T_world_base, (5, 1, 1))
     T[:, 0, 3] = np.linspace(0, 0.2, 5)
     frames = pictures(robot, np.linspace(0, 1, 5), T, np.tile(home.q, (5, 1)), SMALL)
-    with Image.open(save_gif(tmp_path / "walk.gif", frames, 0.08)) as film:
+    with Image.open(save_gif(tmp_path / "walk.gif", frames, 0.32)) as film:
         assert film.n_frames == 5
         assert film.info["loop"] == 0
-        assert film.info["duration"] == 80
         for i, frame in enumerate(frames):
             film.seek(i)
+            assert film.info["duration"] == (40 if i in (0, 4) else 80)
             shown = np.asarray(film.convert("RGB"), dtype=float)
             assert np.abs(shown - frame).mean() < 3.0
     assert [path.name for path in tmp_path.iterdir()] == ["walk.gif"]
+
+
+@given(st.integers(2, 120), st.floats(0.5, 60.0))
+def test_a_film_lasts_as_long_as_its_motion_and_shows_each_picture_at_its_time(
+    count: int, length: float
+) -> None:
+    shown = _milliseconds(count, length)
+    assert len(shown) == count
+    assert all(time % 10 == 0 and time > 0 for time in shown)
+    if length / count >= 0.03:  # shorter ones are held for the hundredth that a GIF can hold at least
+        assert sum(shown) == pytest.approx(1000 * length, abs=5.001)
+        ends = np.cumsum(shown)[:-1]
+        np.testing.assert_allclose(
+            ends, 1000 * length * (np.arange(count - 1) + 0.5) / (count - 1), atol=5.001
+        )
 
 
 def test_a_picture_survives_as_png_and_an_unwritable_place_is_told(robot: Robot, tmp_path: Path) -> None:
