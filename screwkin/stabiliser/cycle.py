@@ -214,9 +214,12 @@ def cycle(
     there = pair_sum(
         now.place_before, pair_turned((rhythm.middle[0], now.side * rhythm.middle[1]), ahead.steps[0][2])
     )
-    at_rest = either(starting, first_shift(rhythm, memory, dcm, beside), stopping_zmp(rhythm, dcm, beside))
+    shift = first_shift(rhythm, memory, dcm, beside, ahead.steps[0][:2])
+    under = rhythm.middle[0], memory.side * rhythm.middle[1]
+    begins = starting & (now.mode > 0.5)
+    at_rest = either(begins, under, either(starting, shift, stopping_zmp(rhythm, dcm, beside)))
     zmp = either(stepping, either(now.lands, there, decided.zmp), at_rest)
-    ease = where(stepping, dt / larger(rhythm.both - now.tau, dt), 0.3)
+    ease = where(stepping | begins, dt / larger(rhythm.both - now.tau, dt), where(starting, 1.0, 0.3))
     zmp = pair_sum(
         memory.zmp, pair_difference(pair_sum(origin, pair_turned(_pair(zmp), yaw)), memory.zmp), ease
     )

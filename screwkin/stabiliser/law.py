@@ -220,6 +220,12 @@ def waited(z: Scalar) -> Scalar:
     return total
 
 
+def delay(rhythm: Rhythm, time: Scalar) -> Scalar:
+    """``waited`` of a ZMP that goes in cycles, in each of which it stands where the ramp is at its end."""
+    cycle = waited(rhythm.w * rhythm.dt)
+    return larger(1.0 - (1.0 - waited(rhythm.w * time)) / (1.0 - cycle), 0.0)
+
+
 def entry(rhythm: Rhythm, side: Scalar, came: Pair, step: Sequence[Scalar]) -> Pair:
     """DCM beside a foot's ZMP as it begins to stand, so that its step ends as the next ones need it.
 
@@ -229,7 +235,7 @@ def entry(rhythm: Rhythm, side: Scalar, came: Pair, step: Sequence[Scalar]) -> P
         came: by how much the ZMP moves to it, in its axes [m].
         step: displacement (forward, left) of the other foot while it stands; later ones are taken for alike.
     """
-    growth, late = exponential(rhythm.w * rhythm.period), waited(rhythm.w * rhythm.both)
+    growth, late = exponential(rhythm.w * rhythm.period), delay(rhythm, rhythm.both)
     alike, turns = (1.0 - growth * late) / (growth - 1.0), (1.0 + growth * late) / (growth + 1.0)
     wide = 2.0 * (rhythm.apart + rhythm.middle[1])  # between the middles of the soles
     goes = step[0], step[1] - side * wide
@@ -291,18 +297,22 @@ def step_landing(
     (cx, cy), (hx, hy) = rhythm.middle, rhythm.half
     here, there = (cx, side * cy), (cx, -side * cy)
     nominal = nominal_place(rhythm, side, steps[0])
-    came = pair_difference(pair_sum(nominal, there), here)
-    goal = pair_sum(pair_sum(nominal, there), entry(rhythm, -side, came, steps[1]))  # DCM as the step ends
+    next_zmp = pair_sum(nominal, there)
+    # The DCM as the step ends, had the ZMP stayed at the tip; it needs late of it more or less.
+    goal = pair_sum(next_zmp, entry(rhythm, -side, next_zmp, steps[1]))
+    late = delay(rhythm, rhythm.both)
     left = larger(course.period - tau, dt)
     growth = exponential(w * left)
-    ramp = growth * waited(w * clipped(rhythm.both - tau, 0.0, rhythm.both))
+    ramp = growth * delay(rhythm, clipped(rhythm.both - tau, 0.0, rhythm.both))
     wanted = tuple(
-        (g - growth * x + ramp * z) / (1.0 - growth + ramp) for g, x, z in zip(goal, dcm, zmp, strict=True)
+        (g - growth * x + ramp * z) / (1.0 - growth + ramp - late)
+        for g, x, z in zip(goal, dcm, zmp, strict=True)
     )
     far = left > 0.1
     held = where(far, wanted[0], course.held[0]), where(far, wanted[1], course.held[1])
     room = gains.sole * (hx - gains.margin), gains.sole * (hy - gains.margin)
     aim = pair_within(held, pair_difference(here, room), pair_sum(here, room))
+    goal = pair_sum(goal, aim, late)
     period = _timed(rhythm, gains, course, goal[1] - aim[1], dcm[1] - aim[1], feedback)
     growth = exponential(w * larger(period - tau, dt))
     end = pair_sum(pair_sum(aim, pair_difference(dcm, aim), growth), pair_difference(zmp, aim), -ramp)
@@ -340,19 +350,24 @@ def _timed(
     return where(free, timed, course.period)
 
 
-def first_shift(rhythm: Rhythm, course: StepState, dcm: Pair, beside: Pair) -> Pair:
-    """ZMP that brings the DCM from rest to where the first step wants it, within both soles.
+def first_shift(rhythm: Rhythm, course: StepState, dcm: Pair, beside: Pair, step: Sequence[Scalar]) -> Pair:
+    """ZMP that brings the DCM from rest onto the periodic orbit of the steps, within both soles.
+
+    It stays there until the first step begins and goes evenly under the foot that stands then; what it
+    lacks there would grow from step to step.
 
     Args:
         rhythm: what is constant.
         course: time since it began, and side of the foot that will stand.
         dcm: in the axes of that foot.
         beside: the other foot, in them.
+        step: displacement (forward, left) of the first step; later ones are taken for alike.
     """
-    side, (cx, cy) = course.side, rhythm.middle
-    goal = pair_sum((cx, side * cy), entry(rhythm, side, (0.0, side * (rhythm.apart + cy)), (0.0, 0.0)))
-    settle = exponential(rhythm.w * larger(rhythm.beginning - course.tau, 0.08))
-    zmp = tuple((g - x * settle) / (1.0 - settle) for g, x in zip(goal, dcm, strict=True))
+    here = rhythm.middle[0], course.side * rhythm.middle[1]
+    goal = pair_sum(here, entry(rhythm, course.side, here, step))  # as if the ZMP came from the tip
+    late = delay(rhythm, rhythm.both)
+    settle = exponential(rhythm.w * larger(rhythm.beginning - course.tau, rhythm.dt))
+    zmp = tuple((g - x * settle) / (1.0 - settle - late) for g, x in zip(goal, dcm, strict=True))
     return _between(rhythm, (zmp[0], zmp[1]), beside)
 
 
