@@ -157,11 +157,12 @@ def _estimated(rhythm: Rhythm, gains: Gains, memory: Memory, seen: _Seen) -> tup
     lasting = pair_sum(memory.lasting, pair_difference(off, memory.lasting), dt / gains.level_time)
     gap = pair_difference(off, lasting)
     old = either(memory.seen > 0.5, memory.gap, gap)
-    speed = pair_within(((gap[0] - old[0]) / dt, (gap[1] - old[1]) / dt), (-0.6, -0.6), (0.6, 0.6))
+    far, dead = gains.largest * rhythm.com_height, gains.dead * rhythm.half[1]
+    fast = 1.3 * far * rhythm.w
+    speed = pair_within(((gap[0] - old[0]) / dt, (gap[1] - old[1]) / dt), (-fast, -fast), (fast, fast))
     rate = pair_sum(memory.gap_rate, pair_difference(speed, memory.gap_rate), gains.rate_filter)
-    far = gains.largest
     whole = pair_sum(gap, rate, 1.0 / rhythm.w)
-    beyond = pair_difference(whole, pair_within(whole, (-gains.dead, -gains.dead), (gains.dead, gains.dead)))
+    beyond = pair_difference(whole, pair_within(whole, (-dead, -dead), (dead, dead)))
     error = pair_within(beyond, (-far, -far), (far, far))
     R = seen.attitude
     about = atan2(-R.z.y, R.z.z), atan2(R.z.x, R.z.z)

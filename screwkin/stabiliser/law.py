@@ -24,14 +24,16 @@ Pair = tuple[Scalar, Scalar]
 T = TypeVar("T")
 HALVINGS = 5
 TERMS = 14
-APART = 0.004
-"""Between the soles [m], at least."""
-QUICK = 0.012
-"""By how much a landing place moves in a cycle [m], at most."""
+APART = 0.025
+"""Between the soles at least, as a share of the CoM's height."""
+QUICK = 0.073
+"""By how much a landing place moves in a cycle at most, as a share of the CoM's height."""
 LATE = 0.85
 """Share of a swing from which the landing place stays."""
-MOMENT = 0.03
-"""Before a landing from which its time stays [s]."""
+MOMENT = 3.0
+"""Cycles before a landing from which its time stays."""
+SETTLED = 0.775
+"""Time before a landing from which the wanted ZMP stays, in time constants of the pendulum."""
 
 
 def clipped(x: Scalar, low: Scalar, high: Scalar) -> Scalar:
@@ -141,15 +143,16 @@ def raised(u: Scalar, ramp: float = 0.35) -> Scalar:
 
 @dataclass(frozen=True)
 class Gains:
-    """How strongly a stabiliser answers; its own figures, none of the robot's.
+    """How strongly a stabiliser answers; its own figures, none of the robot's: its lengths are shares.
 
-    pull: share of the DCM's error beyond dead [m] that the pendulum takes over in a cycle, ahead and aside;
+    pull: share of the DCM's error beyond dead that the pendulum takes over in a cycle, ahead and aside;
     rate_filter: of the error's rate, share of the newest; lean: share of the trunk's lean by which the
     swing foot turns; lean_filter: share of the newest; level_time: time constant of what lasts, the floor's
-    slope and the CoM's gap [s], which is left alone; sole: share of the sole, less margin [m], in which the
-    ZMP may go; step: share of what is left that the foot's place takes, up to reach ahead and aside [m], by
-    at most 12 mm a cycle; timing: share of it that the step's time takes, within sooner to later of the
-    planned time, by at most 20 ms a cycle; largest: error of the DCM beyond which it counts no more [m].
+    slope and the CoM's gap [s], which is left alone; sole: share of the sole, less margin, in which the
+    ZMP may go; step: share of what is left that the foot's place takes, up to reach ahead and aside;
+    timing: share of it that the step's time takes, within sooner to later of the planned time, by at most
+    two cycles a cycle; largest: error of the DCM beyond which it counts no more.
+    dead and margin are shares of half the sole's width, reach and largest of the CoM's height.
     """
 
     pull: Pair = (0.12, 0.12)
@@ -157,15 +160,15 @@ class Gains:
     lean: Scalar = 0.6
     lean_filter: Scalar = 0.5
     level_time: Scalar = 1.0
-    dead: Scalar = 0.012
+    dead: Scalar = 0.36
     sole: Scalar = 0.6
-    margin: Scalar = 0.006
+    margin: Scalar = 0.18
     step: Scalar = 1.0
-    reach: Pair = (0.07, 0.05)
+    reach: Pair = (0.43, 0.31)
     timing: Scalar = 1.0
     sooner: Scalar = 0.7
     later: Scalar = 1.4
-    largest: Scalar = 0.06
+    largest: Scalar = 0.37
 
 
 @dataclass(frozen=True)
@@ -308,25 +311,25 @@ def step_landing(
         (g - growth * x + ramp * z) / (1.0 - growth + ramp - late)
         for g, x, z in zip(goal, dcm, zmp, strict=True)
     )
-    far = left > 0.1
+    far = w * left > SETTLED
     held = where(far, wanted[0], course.held[0]), where(far, wanted[1], course.held[1])
-    room = gains.sole * (hx - gains.margin), gains.sole * (hy - gains.margin)
+    room = gains.sole * (hx - gains.margin * hy), gains.sole * (hy - gains.margin * hy)
     aim = pair_within(held, pair_difference(here, room), pair_sum(here, room))
     goal = pair_sum(goal, aim, late)
     period = _timed(rhythm, gains, course, goal[1] - aim[1], dcm[1] - aim[1], feedback)
     growth = exponential(w * larger(period - tau, dt))
     end = pair_sum(pair_sum(aim, pair_difference(dcm, aim), growth), pair_difference(zmp, aim), -ramp)
     free = pair_sum(nominal, pair_difference(end, goal), gains.step * feedback)  # what the ZMP leaves
-    (rx, ry), wide = gains.reach, 2.0 * rhythm.apart
-    close = larger(wide - ry, 2.0 * (hy - cy) + APART)
+    h, wide = rhythm.com_height, 2.0 * rhythm.apart
+    rx, ry = gains.reach[0] * h, gains.reach[1] * h
+    close, quick = larger(wide - ry, 2.0 * (hy - cy) + APART * h), (QUICK * h, QUICK * h)
+    slow = -QUICK * h, -QUICK * h
     bounded = (
         clipped(free[0], nominal[0] - rx, nominal[0] + rx),
         -side * clipped(-side * free[1], close, wide + ry),
     )
     share = (tau - rhythm.both) / larger(period - rhythm.both, 1e-3)
-    moved = pair_sum(
-        course.place, pair_within(pair_difference(bounded, course.place), (-QUICK, -QUICK), (QUICK, QUICK))
-    )
+    moved = pair_sum(course.place, pair_within(pair_difference(bounded, course.place), slow, quick))
     still = share >= LATE
     chosen = where(still, course.place[0], moved[0]), where(still, course.place[1], moved[1])
     return Landing(aim, chosen, period, held)
@@ -337,16 +340,17 @@ def _timed(
 ) -> Scalar:
     """Duration of the step with which the DCM aside grows from where it is to where the next step wants it.
 
-    Both are beside the ZMP: where that suffices, the step takes its time. It changes by at most 20 ms
-    a cycle, once both feet have stood for their share, and not in the last moment.
+    Both are beside the ZMP: where that suffices, the step takes its time. It changes by at most two
+    cycles a cycle, once both feet have stood for their share, and not in the last moment.
     """
     w, T, tau = rhythm.w, rhythm.period, course.tau
-    most, free = exponential(0.02 * w), (tau > rhythm.both) & (course.period - tau > MOMENT)
+    moment = MOMENT * rhythm.dt
+    most, free = exponential(2.0 * rhythm.dt * w), (tau > rhythm.both) & (course.period - tau > moment)
     growth = exponential(w * larger(course.period - tau, rhythm.dt))
-    runs = wanted * now > 1e-9
+    runs = wanted * now > 1e-6 * rhythm.com_height * rhythm.com_height
     ratio = clipped(where(runs, wanted / where(runs, now * growth, 1.0), most), 1.0 / most, most)
     change = feedback * gains.timing / w * logarithm(ratio)
-    timed = larger(clipped(course.period + change, gains.sooner * T, gains.later * T), tau + MOMENT)
+    timed = larger(clipped(course.period + change, gains.sooner * T, gains.later * T), tau + moment)
     return where(free, timed, course.period)
 
 

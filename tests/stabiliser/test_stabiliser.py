@@ -175,6 +175,32 @@ def test_even_steps_are_a_fixed_point_of_the_law(
     np.testing.assert_allclose(far, 0.0, atol=1e-3)
 
 
+@given(
+    size=st.floats(0.3, 8.0), tau=st.floats(0.0, 0.39), side=st.sampled_from([1.0, -1.0]),
+    values=st.lists(st.floats(-0.08, 0.08), min_size=8, max_size=8),
+)  # fmt: skip
+def test_a_larger_robot_is_answered_as_a_small_one(
+    size: float, tau: float, side: float, values: list[float]
+) -> None:
+    """Lengths are times its size, times the square root of it: so is all that the law decides."""
+    slow = math.sqrt(size)
+
+    def decided(far: float, time: float) -> np.ndarray:
+        rhythm = Rhythm(
+            0.4 * time, 0.25, 0.012 * far, 0.164 * far, 0.042 * far, (0.052 * far, 0.033 * far),
+            (0.004 * far, 0.002 * far), 0.8 * time, CYCLE * time,
+        )  # fmt: skip
+        x = [far * v for v in values]
+        course = _Course(tau * time, 0.4 * time, side, (x[0], x[1]), (x[2], x[3] - side * 0.084 * far))
+        steps = [(x[4], 0.0), (x[5], 0.0)]
+        landing = law.step_landing(rhythm, Gains(), course, (x[6], x[7]), (x[0], x[1]), steps, 1.0)  # type: ignore[arg-type]
+        shift = law.first_shift(rhythm, course, (x[6], x[7]), (x[0], -side * 0.084 * far), steps[0])  # type: ignore[arg-type]
+        lengths = np.array([*landing.zmp, *landing.place, *landing.held, *shift]) / far
+        return np.array([*lengths, landing.period / time])
+
+    np.testing.assert_allclose(decided(size, slow), decided(1.0, 1.0), atol=1e-6)
+
+
 @settings(max_examples=30)
 @given(
     period=st.floats(0.3, 1.0), double=st.floats(0.1, 0.3), height=st.floats(0.12, 0.6),
