@@ -15,6 +15,7 @@ from screwkin.cli.options import AsJson
 from screwkin.cli.output import aligned, print_json, remark, say
 from screwkin.errors import InputError
 from screwkin.files import atomic_write
+from screwkin.model.dh_robot import refuse_dh
 from screwkin.model.table import load_robot
 
 
@@ -31,6 +32,7 @@ def new(
     Each is explained, with a confidence from 0 to 1, here and in comments of the table, for you to edit.
     A robot that does not stand on two legs is refused, with the reason.
     """
+    refuse_dh(source, "finding limbs")
     found = anatomy(load_robot(source))
     path = Path(f"{found.robot.name}.toml") if target is None else target
     if path.suffix.lower() != ".toml":

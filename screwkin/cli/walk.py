@@ -26,6 +26,7 @@ from screwkin.gait.record import Gait, Side
 from screwkin.gait.stand import Place, stand
 from screwkin.gait.walk import walk as walk_of
 from screwkin.gait.write import gait_toml
+from screwkin.model.dh_robot import refuse_dh
 from screwkin.model.robot import Robot, robot_text
 from screwkin.model.table import load_robot
 from screwkin.report.names import PAGE, remove_reports
@@ -83,6 +84,7 @@ def walk(
     outside the support polygon is a warning; the trajectory is written all the same. Walks over footsteps, to
     goals and along curves begin and end at home (--set lead=0: they do not).
     """
+    refuse_dh(robot, "a walk")
     table = load_robot(robot)
     if auto and not table.limbs:
         table = limbed(table)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from pathlib import Path
 
 from screwkin.algebra.se3 import UNTURNED, ZERO, Pose, as_array
 from screwkin.errors import InputError
@@ -66,6 +67,24 @@ def robot_from_dh(tables: Sequence[DHTable], name: str, path: str = "<tables>") 
         limbs=tuple(limbs),
     )
     return Robot.from_text(robot_toml(robot), path)
+
+
+def refuse_dh(source: str | Path, what: str) -> None:
+    """Refuse a file of DH tables where a whole robot is needed.
+
+    Args:
+        source: the file, or the name of a robot.
+        what: needs one.
+
+    Raises:
+        InputError: says what such a table lacks.
+    """
+    if Path(source).suffix.lower() == ".csv":
+        raise InputError(
+            f"{source} is a DH table: it tells axes alone, and {what} needs masses, inertias, joint limits"
+            " and feet. Give a URDF or MJCF of the robot, or convert it (screwkin convert) and write them"
+            " into the table"
+        )
 
 
 def _massless(name: str, frame: Pose) -> Link:

@@ -5,6 +5,11 @@ from pathlib import Path
 from screwkin.model.table import load_robot
 from tests.anatomy.bodies import biped
 
+DH = """convention,limb,joint,type,alpha_deg,a_mm,d_mm,offset_deg
+modified,left_leg,left_hip,revolute,90,19,0,0
+modified,left_leg,left_foot,fixed,90,31,0,90
+"""
+
 
 def test_a_urdf_becomes_a_table_with_limbs_soles_and_home(cli):
     Path("body.urdf").write_text(biped().text(), encoding="utf-8")
@@ -42,3 +47,13 @@ def test_only_tables_are_written(cli):
     called = cli("new", "body.urdf", "-o", "body.urdf")
     assert called.code == 2
     assert "must end with .toml" in called.err
+
+
+def test_a_dh_table_is_refused_with_what_it_lacks(cli):
+    Path("leg.csv").write_text(DH, encoding="utf-8")
+    called = cli("new", "leg.csv", "-o", "leg.toml")
+    assert called.code == 2
+    assert called.err.startswith("error: leg.csv is a DH table: it tells axes alone, and finding limbs needs")
+    assert "masses, inertias, joint limits and feet" in called.err
+    assert called.err.count("\n") == 1
+    assert not Path("leg.toml").exists()

@@ -8,6 +8,7 @@ import pytest
 
 import screwkin as sk
 from tests.bodies import humanoid
+from tests.cli.test_new import DH
 
 WALK = ("walk", "bioloid", "--gait", "paper", "--no-plots")
 
@@ -249,3 +250,14 @@ def test_who_chose_no_gait_is_told_of_one_that_fits(cli, tmp_path, words):
     else:
         assert called.code == 3
         assert called.err.rstrip().endswith("or fit a gait to the robot: --auto") == (not words)
+
+
+@pytest.mark.parametrize("words", [[], ["--auto"]], ids=str)
+def test_a_dh_table_does_not_walk_and_says_what_it_lacks(cli, tmp_path, words):
+    path = tmp_path / "leg.csv"
+    path.write_text(DH, encoding="utf-8")
+    called = cli("walk", path, *words, "-o", "out")
+    assert called.code == 2
+    assert "leg.csv is a DH table: it tells axes alone, and a walk needs masses, inertias" in called.err
+    assert called.err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
