@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -11,11 +10,13 @@ import pytest
 
 import screwkin as sk
 from screwkin.algebra.se3 import IDENTITY, Vector, as_array
+from screwkin.anatomy.humanoid import anatomy
 from screwkin.errors import RobotRemark
 from screwkin.model.srdf import find_srdf, srdf_from_robot
-from screwkin.model.toml_out import robot_toml
 from screwkin.model.urdf import urdf_from_robot
 from screwkin.model.urdf_in import load_urdf, parse_urdf
+from tests.anatomy.bodies import biped
+from tests.model.there_and_back import assert_walks_equally, there_and_back
 from tests.model.urdf_texts import ARM
 
 STATES = """<robot name="arm">
@@ -85,24 +86,18 @@ def test_a_robot_walks_equally_after_urdf_and_srdf_and_table_and_both_again(tmp_
     robot = sk.load_robot("bioloid")
     waist = replace(IDENTITY, p=Vector(0.002, 0, robot.joint("right_hip_pitch").screw.s0.z))
     robot = replace(robot, waist=waist, text="")
-    path = tmp_path / "one.urdf"
-    path.write_text(urdf_from_robot(robot))
-    path.with_suffix(".srdf").write_text(srdf_from_robot(robot))
-    table = sk.robot_from_text(robot_toml(load_urdf(path).robot))
-    last = tmp_path / "three.urdf"
-    last.write_text(urdf_from_robot(table))
-    last.with_suffix(".srdf").write_text(srdf_from_robot(table))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        again = sk.load_robot(last)
-    assert again.tip_names == robot.tip_names
-    assert [sole.limb for sole in again.soles] == [sole.limb for sole in robot.soles]
+    again = there_and_back(robot, tmp_path)
     assert again.frames == ()
     np.testing.assert_allclose(as_array(again.waist), as_array(waist), atol=1e-15)
-    gait = sk.load_gait("walk")
-    ours, theirs = sk.walk(again, gait), sk.walk(robot, gait)
-    for name in ("q", "T_world_base", "zmp", "margin"):
-        np.testing.assert_allclose(getattr(ours, name), getattr(theirs, name), rtol=0, atol=1e-9)
+    assert_walks_equally(again, robot, sk.load_gait("walk"))
+
+
+def test_a_humanoid_read_off_its_geometry_walks_equally_after_all_of_these(tmp_path):
+    """Its limbs, soles and home are those that anatomy finds; joints of waist and neck are in no leg."""
+    path = tmp_path / "body.urdf"
+    path.write_text(biped(waist="yaw", neck=True).text(), encoding="utf-8")
+    robot = anatomy(load_urdf(path).robot).robot
+    assert_walks_equally(there_and_back(robot, tmp_path), robot, sk.fitting_gait(robot))
 
 
 def test_pinocchio_finds_the_postures_and_the_frames_that_were_written(tmp_path):

@@ -14,8 +14,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from screwkin.model.urdf_in import parse_urdf
+import screwkin as sk
+from screwkin.anatomy.humanoid import anatomy
+from screwkin.model.urdf_in import load_urdf, parse_urdf
 from tests.model.as_pinocchio import assert_agrees, model_of
+from tests.model.there_and_back import assert_walks_equally, there_and_back
 
 pytestmark = pytest.mark.robots
 
@@ -45,3 +48,14 @@ def test_a_robot_that_pinocchio_reads_is_read_and_agrees(file: Path) -> None:
         pytest.skip(f"Pinocchio does not read it: {wrong}")
     robot = parse_urdf(text, str(file)).robot
     assert_agrees(robot, model_of(text, robot.base == "floating"), np.random.default_rng(3))
+
+
+@pytest.mark.parametrize("name", ["talos_reduced", "icub"])
+def test_an_imported_humanoid_walks_equally_after_both_files_and_a_table_and_both_again(
+    name: str, tmp_path: Path
+) -> None:
+    found = [file for file in files() if file.stem == name]
+    if not found:
+        pytest.skip(f"no {name}.urdf: install example-robot-data, or name its folder in SCREWKIN_ROBOTS")
+    robot = anatomy(load_urdf(found[0]).robot).robot
+    assert_walks_equally(there_and_back(robot, tmp_path), robot, sk.fitting_gait(robot))
