@@ -4,7 +4,8 @@ Every URDF is read, its limbs, soles and home are found, a gait is fitted to it,
 validated in both engines with rigid servos, as ``screwkin walk --auto`` and ``screwkin validate`` do. Each
 row is appended to ``benchmarks/results/robots.jsonl`` (or --rows) at once; files that stand there are tried
 again with --again alone, and the last row of a file counts. --unseen marks robots chosen after the rules of
-the search were frozen. --page writes the table of all rows as Markdown.
+the search were frozen; what became of them at this first try is counted apart. --page writes the table of all
+rows as Markdown.
 """
 
 from __future__ import annotations
@@ -113,8 +114,8 @@ def _gait(path: Path, row: Row) -> None:
 
 def page_of(rows: Sequence[Row]) -> str:
     """The table of all rows."""
-    walked, unseen = [row for row in rows if passed(row)], [row for row in rows if row.get("unseen")]
-    unseen_walk = sum(map(passed, unseen))
+    walked, firsts = sum(map(passed, rows)), [row["first"] for row in rows if "first" in row]
+    first = f"{sum(firsts)} did at the first try"
     lines = [
         "# Public robots, unedited",
         "",
@@ -123,8 +124,8 @@ def page_of(rows: Sequence[Row]) -> str:
         "on rigid servos. Anatomy: processor time of limbs, soles and home.",
         "Solved: the share of a leg's own random poses within limits that inverse kinematics finds again.",
         "",
-        f"{len(walked)} of {len(rows)} files that were tried walk in both engines. Of the {len(unseen)} with",
-        f"a star, chosen after the rules of the search had been frozen and tried once, {unseen_walk} do.",
+        f"{walked} of {len(rows)} files that were tried walk in both engines. Those with a star were chosen",
+        f"after the rules of the search had been frozen; of these {len(firsts)}, {first}.",
         "Rows without a star may be older than these rules; `--again` makes them anew.",
         "",
         "| robot | joints | legs, arms | leg IK | solved | anatomy | gait | MuJoCo | PyBullet |",
@@ -159,7 +160,7 @@ def _line(row: Row) -> str:
         if e in verdicts
     ] or [reason, ""]
     start = [
-        row["file"] + " *" * row.get("unseen", False),
+        row["file"] + " *" * ("first" in row or "unseen" in row),
         str(row.get("joints", "")),
         f"{legs}, {arms}",
         row.get("ik", ""),
@@ -178,21 +179,27 @@ def main() -> None:
     asked = parser.parse_args()
     pin_threads()
     warnings.simplefilter("ignore")
-    done = {row["file"]: row for row in read_rows(asked.rows)}
+    done = {row["file"] for row in read_rows(asked.rows)}
     for path in files_of(asked.places):
         if asked.again or file_of(path) not in done:
-            row = done[file_of(path)] = row_of(path) | ({"unseen": True} if asked.unseen else {})
+            row = row_of(path) | ({"unseen": True} if asked.unseen else {})
+            done.add(file_of(path))
             with asked.rows.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(row) + "\n")
             print(_line(row), flush=True)
     if asked.page:
-        asked.page.write_text(page_of(list(done.values())), encoding="utf-8")
+        asked.page.write_text(page_of(read_rows(asked.rows)), encoding="utf-8")
 
 
 def read_rows(path: Path) -> list[Row]:
-    """The last row of every file; none where there is no such list."""
+    """The last row of every file; ``first`` says of unseen ones whether they walked when first tried."""
     lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
-    return list({row["file"]: row for row in map(json.loads, lines)}.values())
+    rows: dict[str, Row] = {}
+    for row in map(json.loads, lines):
+        name = row["file"]
+        before = rows.get(name, {"first": passed(row)} if row.get("unseen") else {})
+        rows[name] = row | ({"first": before["first"]} if "first" in before else {})
+    return list(rows.values())
 
 
 if __name__ == "__main__":

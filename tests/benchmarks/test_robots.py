@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 from benchmarks.robots import ENGINES, ROWS, page_of, passed, read_rows
@@ -26,3 +27,14 @@ def test_the_last_row_of_a_file_counts(tmp_path: Path) -> None:
     rows.write_text('{"file": "a"}\n{"file": "b"}\n{"file": "a", "joints": 3}\n', encoding="utf-8")
     assert read_rows(rows) == [{"file": "a", "joints": 3}, {"file": "b"}]
     assert read_rows(tmp_path / "none.jsonl") == []
+
+
+def test_a_robot_chosen_unseen_keeps_the_verdict_of_its_first_try(tmp_path: Path) -> None:
+    good = {"verdicts": {engine: {"passed": True, "reasons": []} for engine in ENGINES}}
+    tries = [{"file": "a", "unseen": True}, {"file": "b"}, {"file": "a", **good}, {"file": "b", **good}]
+    rows = tmp_path / "rows.jsonl"
+    rows.write_text("\n".join(map(json.dumps, tries)), encoding="utf-8")
+    assert [(row["file"], passed(row), row.get("first")) for row in read_rows(rows)] == [
+        ("a", True, False),
+        ("b", True, None),
+    ]
