@@ -213,10 +213,10 @@ def cycle(
     decided = step_landing(rhythm, gains, memory, dcm, stood, [step[:2] for step in ahead.steps], feedback)
     now = _now(rhythm, memory, decided, starting, stepping, ahead)
     there = pair_sum(
-        now.place_before, pair_turned((rhythm.middle[0], now.side * rhythm.middle[1]), ahead.steps[0][2])
+        now.place_before, pair_turned((rhythm.under[0], now.side * rhythm.under[1]), ahead.steps[0][2])
     )
     shift = first_shift(rhythm, memory, dcm, beside, ahead.steps[0][:2])
-    under = rhythm.middle[0], memory.side * rhythm.middle[1]
+    under = rhythm.under[0], memory.side * rhythm.under[1]
     begins = starting & (now.mode > 0.5)
     at_rest = either(begins, under, either(starting, shift, stopping_zmp(rhythm, dcm, beside)))
     zmp = either(stepping, either(now.lands, there, decided.zmp), at_rest)

@@ -178,6 +178,7 @@ class Rhythm:
     period: of a step [s]; double: share of it on both feet; lift [m]; com_height: of the CoM [m]; apart: from
     the middle to a foot [m]; half: half edges of the sole, and middle: of the sole ahead of the tip and
     outwards [m]; beginning: from rest to the first step [s]; dt: of a cycle [s].
+    inward: from there to where the ZMP of a step stands: out over the edge is no way back [m].
     """
 
     period: Scalar
@@ -189,11 +190,17 @@ class Rhythm:
     middle: Pair
     beginning: Scalar = 0.8
     dt: Scalar = 0.01
+    inward: Scalar = 0.0
 
     @property
     def w(self) -> Scalar:
         """Rate of divergence [1/s]."""
         return sqrt(GRAVITY / self.com_height)
+
+    @property
+    def under(self) -> Pair:
+        """Where the ZMP of a step stands on a sole, ahead of the tip and outwards [m]."""
+        return self.middle[0], self.middle[1] - self.inward
 
     @property
     def both(self) -> Scalar:
@@ -240,7 +247,7 @@ def entry(rhythm: Rhythm, side: Scalar, came: Pair, step: Sequence[Scalar]) -> P
     """
     growth, late = exponential(rhythm.w * rhythm.period), delay(rhythm, rhythm.both)
     alike, turns = (1.0 - growth * late) / (growth - 1.0), (1.0 + growth * late) / (growth + 1.0)
-    wide = 2.0 * (rhythm.apart + rhythm.middle[1])  # between the middles of the soles
+    wide = 2.0 * (rhythm.apart + rhythm.under[1])  # between the ZMPs of both feet
     goes = step[0], step[1] - side * wide
     later = step[0] * alike, step[1] * alike + side * wide * turns
     return (goes[0] + later[0]) / growth - late * came[0], (goes[1] + later[1]) / growth - late * came[1]
@@ -297,7 +304,7 @@ def step_landing(
     """
     w, dt = rhythm.w, rhythm.dt
     side, tau = course.side, course.tau
-    (cx, cy), (hx, hy) = rhythm.middle, rhythm.half
+    (cx, cy), (hx, hy) = rhythm.under, rhythm.half
     here, there = (cx, side * cy), (cx, -side * cy)
     nominal = nominal_place(rhythm, side, steps[0])
     next_zmp = pair_sum(nominal, there)
@@ -322,7 +329,8 @@ def step_landing(
     free = pair_sum(nominal, pair_difference(end, goal), gains.step * feedback)  # what the ZMP leaves
     h, wide = rhythm.com_height, 2.0 * rhythm.apart
     rx, ry = gains.reach[0] * h, gains.reach[1] * h
-    close, quick = larger(wide - ry, 2.0 * (hy - cy) + APART * h), (QUICK * h, QUICK * h)
+    close = larger(wide - ry, 2.0 * (hy - rhythm.middle[1]) + APART * h)
+    quick = QUICK * h, QUICK * h
     slow = -QUICK * h, -QUICK * h
     bounded = (
         clipped(free[0], nominal[0] - rx, nominal[0] + rx),
@@ -367,7 +375,7 @@ def first_shift(rhythm: Rhythm, course: StepState, dcm: Pair, beside: Pair, step
         beside: the other foot, in them.
         step: displacement (forward, left) of the first step; later ones are taken for alike.
     """
-    here = rhythm.middle[0], course.side * rhythm.middle[1]
+    here = rhythm.under[0], course.side * rhythm.under[1]
     goal = pair_sum(here, entry(rhythm, course.side, here, step))  # as if the ZMP came from the tip
     late = delay(rhythm, rhythm.both)
     settle = exponential(rhythm.w * larger(rhythm.beginning - course.tau, rhythm.dt))

@@ -23,6 +23,7 @@ CYCLE = 0.01
 """Duration of a cycle [s]."""
 _SHIFT = 1e-3  # m: by which the waist is moved to see how the CoM follows
 _SHIFTS = 3.0  # times the time constant of the pendulum: to shift the weight to a foot
+_INWARD = 0.2  # of half the sole's width: the ZMP stands that much nearer to the other foot than the middle
 _LEVEL = 1e-3  # m: how far soles of one floor may be apart
 
 
@@ -105,6 +106,7 @@ def rhythm_of(plan: Trajectory, tips: tuple[str, str], swings: list[Swing], sole
         middle=(float(ahead), -float(aside)),
         beginning=beginning,
         dt=CYCLE,
+        inward=_INWARD * float(half[1]),
     )
 
 

@@ -139,21 +139,21 @@ def test_a_larger_robot_is_answered_as_a_small_one(
     period=st.floats(0.3, 1.0), double=st.floats(0.1, 0.3), height=st.floats(0.12, 0.6),
     size=st.floats(0.5, 2.0),
     ahead=st.floats(-0.4, 0.4), middle=st.tuples(st.floats(-0.2, 0.2), st.floats(-0.1, 0.1)),
-    beginning=st.floats(3.0, 8.0), side=st.sampled_from([1.0, -1.0]),
+    inward=st.floats(0.0, 0.2), beginning=st.floats(3.0, 8.0), side=st.sampled_from([1.0, -1.0]),
 )  # fmt: skip
 def test_the_first_shift_leads_onto_the_periodic_orbit(
     period: float, double: float, height: float, size: float, ahead: float, middle: tuple[float, float],
-    beginning: float, side: float,
+    inward: float, beginning: float, side: float,
 ) -> None:  # fmt: skip
-    """From rest: the first step needs no ZMP beside the sole's middle, whatever the robot and the rhythm."""
+    """From rest: the first step needs no ZMP beside where it shall stand, for any robot and rhythm."""
     apart, cycle = 0.042 * size, 0.002
     rhythm = replace(
         RHYTHM, period=period, double=double, com_height=height, apart=apart, dt=cycle,
         half=(0.052 * size, 0.033 * size), middle=(middle[0] * apart, middle[1] * apart),
     )  # fmt: skip
-    rhythm = replace(rhythm, beginning=cycle * round(beginning / rhythm.w / cycle))
+    rhythm = replace(rhythm, beginning=cycle * round(beginning / rhythm.w / cycle), inward=inward * apart)
     step, beside = (ahead * apart, 0.0), (0.0, -side * 2 * apart)
-    here = rhythm.middle[0], side * rhythm.middle[1]
+    here = rhythm.under[0], side * rhythm.under[1]
     com, rate, zmp, tau = (
         (rhythm.middle[0], -side * apart),
         (0.0, 0.0),
