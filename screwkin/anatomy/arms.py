@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from screwkin.anatomy.groups import Group
 from screwkin.anatomy.limbs import LEAST, Pair, Standing, depth
 from screwkin.anatomy.skeleton import Skeleton
 from screwkin.anatomy.symmetry import Symmetry
 
 
 def arm_pairs(
-    skeleton: Skeleton, symmetry: Symmetry, stance: Standing
+    skeleton: Skeleton, stance: Standing, groups: Sequence[Group] = ()
 ) -> tuple[Pair | None, tuple[Pair, ...]]:
-    """The pair of arms, None without one, and the pairs that are neither arms nor legs."""
+    """The pair of arms, None without one, and the pairs that are neither arms nor legs.
+
+    Of pairs that groups of the SRDF hold, else of all, it is the one that reaches furthest.
+    """
     if not stance.others:
         return None, ()
-    best = max(stance.others, key=lambda pair: _reach(skeleton, pair.one))
+    named = {i for group in groups for i in group.joints}
+    best = max(stance.others, key=lambda pair: ({pair.one, pair.other} <= named, _reach(skeleton, pair.one)))
     return best, tuple(pair for pair in stance.others if pair is not best)
 
 

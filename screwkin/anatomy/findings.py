@@ -9,6 +9,7 @@ import numpy as np
 from screwkin.anatomy.facets import area_of
 from screwkin.anatomy.footing import Footing
 from screwkin.anatomy.forward import Forward
+from screwkin.anatomy.groups import Group
 from screwkin.anatomy.limbs import SPLAYED, TOPPLED, Pair, Standing
 from screwkin.anatomy.outline import Outline
 from screwkin.anatomy.postures import PARTS, Home
@@ -65,11 +66,12 @@ def of_leg(robot: Robot, side: str, foot: FootShape, stance: Standing) -> Findin
     )
 
 
-def of_arm(robot: Robot, side: str, joints: Sequence[int]) -> Finding:
+def of_arm(robot: Robot, side: str, joints: Sequence[int], group: Group | None) -> Finding:
     """An arm: the other mirrored limb that reaches furthest."""
     names = [robot.tree[i].name for i in joints]
     end = robot.tree[joints[-1]].child
-    why = "of the mirrored limbs that do not stand, this pair reaches furthest; it ends where its chain does"
+    why = "of the mirrored limbs that do not stand, this pair reaches furthest; it ends where "
+    why += "its chain does" if group is None else f"the group {group.name} of the SRDF does"
     return Finding(f"{side}_arm", f"{len(names)} joints, {_listed(names)}, to {end}", 0.9, why)
 
 

@@ -12,6 +12,7 @@ from screwkin.algebra.se3 import (
     UNTURNED,
     ZERO,
     Pose,
+    Rotation,
     Vector,
     pose_from_array,
     rotation_from_array,
@@ -21,6 +22,7 @@ from screwkin.anatomy import findings
 from screwkin.anatomy.arms import arm_chains, arm_pairs
 from screwkin.anatomy.footing import LEVEL, Footing, footings
 from screwkin.anatomy.forward import Forward, forward_of
+from screwkin.anatomy.groups import Group, ends_of, from_shoulder, groups_beside
 from screwkin.anatomy.limbs import AnatomyError, Standing, band_of, root_of, standing_of
 from screwkin.anatomy.outline import Outline
 from screwkin.anatomy.postures import Legs, home_of
@@ -38,6 +40,7 @@ from screwkin.model.state import State
 from screwkin.model.values import COUPLINGS
 
 SIDES = ("left", "right")
+NO_ENDS = (None, None)
 EVEN = 0.01
 """Difference of height, by the leg's length, at which both feet stand on one floor."""
 ASIDE = 10.0
@@ -65,7 +68,8 @@ def anatomy(robot: Robot) -> Anatomy:
     """What a robot of unknown names is: limbs, soles, waist, which way is forward and up, and a home posture.
 
     Args:
-        robot: of numbers, such as one read from URDF; names mean nothing.
+        robot: of numbers, such as one read from URDF; names mean nothing. Where an SRDF file beside its URDF
+            has groups that are the chains of both arms, these end where the groups do.
 
     Raises:
         AnatomyError: it does not stand on exactly two legs, or this cannot be seen; says why.
@@ -106,11 +110,15 @@ def _built(
     _refuse_no_soles(robot, own, footing, stance)
     limbs = [_leg(whole, side, foot, at) for side, foot, at in zip(SIDES, own, footing, strict=True)]
     soles = [Sole(f"{side}_leg", _points(at.places)) for side, at in zip(SIDES, footing, strict=True)]
-    arms, rest = arm_pairs(skeleton, symmetry, stance)
+    groups, told = groups_beside(robot)
+    arms, rest = arm_pairs(skeleton, stance, groups)
     chains = arm_chains(skeleton, symmetry, arms) if arms else ((), ())
-    for side, chain in zip(SIDES, chains if sense > 0 else chains[::-1], strict=True):
-        if chain:
-            limbs.append(_arm(whole, side, chain))
+    ends = ends_of(groups, *chains)
+    if ends is not None:
+        chains = (from_shoulder(ends[0], chains[0]), from_shoulder(ends[1], chains[1]))
+    found_arms = list(zip(chains, ends or NO_ENDS, strict=True))
+    sided = [(side, *one) for side, one in zip(SIDES, found_arms[:: 1 if sense > 0 else -1], strict=True)]
+    limbs += [_arm(whole, side, chain, turn, end) for side, chain, end in sided if chain]
     links = {link.name: link for link in whole.links}
     for foot, at in zip(own, footing, strict=True):
         links[foot.link] = _with_contact(links[foot.link], at, stance.length)
@@ -130,16 +138,15 @@ def _built(
     whole = replace(whole, postures=(home.posture,))
     parts = [(foot.link, *foot.toes) for foot in own]
     both = list(zip(SIDES, own, footing, parts, strict=True))[::-1]
-    sided = list(zip(SIDES, chains if sense > 0 else chains[::-1], strict=True))[::-1]
     symmetric, faces = findings.of_symmetry(skeleton, symmetry), findings.of_forward(forward)
     limb_findings = (
         *(findings.of_leg(whole, side, foot, stance) for side, foot, _, _ in both),
-        *(findings.of_arm(whole, side, chain) for side, chain in sided if chain),
+        *(findings.of_arm(whole, side, chain, end) for side, chain, end in sided[::-1] if chain),
     )
     sole_findings = tuple(findings.of_sole(side, at, part, outline) for side, _, at, part in both)
     waist = findings.of_waist(whole, own, chains)
     at_home = findings.of_home(home, stance.length)
-    remarks = findings.of_rest(whole, rest, outline.remarks)
+    remarks = (*findings.of_rest(whole, rest, outline.remarks), *told)
     found = Anatomy(whole, turn, symmetric, faces, limb_findings, sole_findings, waist, at_home, remarks)
     return replace(found, robot=Robot.from_text(commented_table(found), robot.path))
 
@@ -162,11 +169,12 @@ def _leg(robot: Robot, side: str, foot: FootShape, at: Footing) -> Limb:
     return Limb(f"{side}_leg", "leg", foot.link, tip, pose_from_array(at.tip), COUPLINGS)
 
 
-def _arm(robot: Robot, side: str, chain: tuple[int, ...]) -> Limb:
-    """An arm's tip is the CoM of its hand, with axes as the base's."""
+def _arm(robot: Robot, side: str, chain: tuple[int, ...], turn: Rotation, end: Group | None) -> Limb:
+    """An arm's tip is where its group ends, else the CoM of its hand, with axes as the base's."""
     link = robot.tree[chain[-1]].child
     skeleton = Skeleton.of(robot)
-    place = vector_from_array(skeleton.place(skeleton.links_beyond(chain[-1])))
+    hand = skeleton.place(skeleton.links_beyond(chain[-1]))
+    place = vector_from_array(hand) if end is None else turn @ end.tip
     return Limb(
         f"{side}_arm", "arm", link, _free_name(robot, f"{side}_hand"), Pose(UNTURNED, place), COUPLINGS
     )
