@@ -15,7 +15,14 @@ from screwkin.compiler.program import Program, Recorder
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.compiler.run import run
 from screwkin.ik.closed import EXACT, SAME, conditioned, first_of_its_kind, refined
-from screwkin.ik.eliminated import Candidates, eliminated, elimination, elimination_programs, exact
+from screwkin.ik.eliminated import (
+    Candidates,
+    eliminated,
+    elimination,
+    elimination_programs,
+    exact,
+    planar,
+)
 from screwkin.ik.elimination import BRANCHES
 from screwkin.ik.on_limits import on_limits
 from screwkin.ik.polish import FOLD, NEAR, ROUGH, both_sides, from_guess, iterated, steps, unfolded
@@ -75,8 +82,12 @@ def branch_solutions(
     if by_relative(chain):
         return careful_solutions(chain, *_near_relative(chain, target), target, guess, tolerances, batch)
     found = eliminated(chain, target, guess)
+    shared = np.flatnonzero(planar(chain, target))
+    if len(shared):
+        found = _together(found, eliminated(chain, target[shared], guess[shared], True), shared)
     place = np.arange(len(found.sample)) - np.searchsorted(found.sample, found.sample)
-    solutions, at = _at_once(chain, found, place, len(target), batch), _open(found, len(target), tolerances)
+    solutions = _at_once(chain, found, place, len(target), batch)
+    at = np.union1d(_open(found, len(target), tolerances), shared)
     if len(at):
         number = np.full(len(target), -1)
         number[at] = np.arange(len(at))
@@ -114,6 +125,14 @@ def _certified(
     q[lost, 0], error[lost, 0] = q[lost, k], error[lost, k]
     once = np.ones(valid.shape, dtype=int)
     return ordered(chain, "branches", q, valid, error, once, guess, batch)
+
+
+def _together(found: Candidates, others: Candidates, at: Integers) -> Candidates:
+    """Candidates of all samples and those of some, by numbers ``at``; the best of each sample first."""
+    others = others._replace(sample=at[others.sample])
+    both = Candidates(*map(np.concatenate, zip(found, others, strict=True)))
+    order = np.lexsort((both.key, both.sample))
+    return Candidates(*(part[order] for part in both))
 
 
 def _at_once(

@@ -15,7 +15,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array, Integers
 from screwkin.algebra.harmonics import TOUCH, cells, crossing, derivatives, equal_angles, harmonics
 from screwkin.algebra.screws import Screw
-from screwkin.algebra.se3 import Pose, Vector, norm, unstack
+from screwkin.algebra.se3 import Pose, Vector, as_array, norm, unstack
 from screwkin.compiler.program import Program, Recorder
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.compiler.run import run
@@ -47,6 +47,8 @@ STEP = 1e-4
 """Difference of angles [rad] from which the slope of the determinant is computed."""
 ROUNDING = 1e-15
 """Rounding of the determinant over its largest value."""
+PLANAR = 0.1
+"""How near to a plane of motion a pose is [rad, and m over the limb's length] whose branches share angles."""
 
 
 @per_chain
@@ -60,6 +62,53 @@ def elimination(chain: SerialChain) -> Elimination | None:
     if best is None or error > USABLE:
         best, error = _most_exact(_stirred(chain))
     return best if error <= ROUGHLY else None
+
+
+@per_chain
+def across(chain: SerialChain) -> tuple[Vector, Elimination] | None:
+    """Normal of the plane in which all branches share the angle that is eliminated, and another way there.
+
+    Where the joints beside three parallel axes are at zero, as at the home of most legs, the limb moves in a
+    plane: the branches of such a pose differ in the angles of these three alone.
+    """
+    first = elimination(chain)
+    if first is None or len(chain.screws) != 6:
+        return None
+    axes = np.array([[float(x) for x in screw.s] for screw in chain.screws])
+    parallel = np.abs(axes @ axes.T) > 1.0 - 1e-12
+    own = parallel[int(parallel.sum(axis=1).argmax())]
+    if own.sum() < 3 or own[_joint(first)]:
+        return None
+    low, high = box(chain)
+    q = (low + spread(6, POSES, 0) * (high - low)) * own
+    tips, _ = forward(chain.screws, unstack(q), chain.tip)
+    ways = [way for way in eliminations(chain) if own[_joint(way)]]
+    errors = [float(np.quantile(_errors(way, tips, q), 0.9)) for way in ways]
+    best = int(np.argmin(errors))
+    return (chain.screws[int(own.argmax())].s, ways[best]) if errors[best] <= ROUGHLY else None
+
+
+def _joint(way: Elimination) -> int:
+    """The joint in which is eliminated, by its number in the chain."""
+    return 5 - way.given if way.backwards else way.given
+
+
+def planar(chain: SerialChain, target: Array) -> Array:
+    """Whether poses (B, 4, 4) are of the plane of ``across``, or nearly so."""
+    other = across(chain)
+    if other is None:
+        return np.zeros(len(target), dtype=bool)
+    n = np.array([float(x) for x in other[0]])
+    D = target @ np.linalg.inv(as_array(chain.tip))
+    turned = np.abs(D[:, :3, :3] @ n - n).max(axis=1)
+    return (turned < PLANAR) & (np.abs(D[:, :3, 3] @ n) < PLANAR * chain.length)
+
+
+def _way(chain: SerialChain, beside: bool) -> Elimination:
+    other = across(chain) if beside else None
+    way = other[1] if other else elimination(chain)
+    assert way is not None
+    return way
 
 
 @per_chain
@@ -102,7 +151,7 @@ def _errors(way: Elimination, tips: Pose, q: Array) -> Array:
     That of the given joint by value and slope of the determinant, or that of the null vector and of what
     follows from it: they belong to no single branch where several have that angle in common.
     """
-    D, x = way.displacement(tips), q[:, 5 - way.given if way.backwards else way.given]
+    D, x = way.displacement(tips), q[:, _joint(way)]
     table = np.array([[np.broadcast_to(entry, x.shape) for entry in part] for part in way.table(D)])
     around = np.concatenate([equal_angles(ANGLES)[:, None] + 0 * x, [x, x + STEP, x - STEP]])
     matrices = _at(table.swapaxes(0, 1), around)
@@ -143,29 +192,30 @@ class Candidates(NamedTuple):
     key: Array
 
 
-def eliminated(chain: SerialChain, target: Array, guess: Array) -> Candidates:
+def eliminated(chain: SerialChain, target: Array, guess: Array, beside: bool = False) -> Candidates:
     """The candidates of a limb that has an elimination: what the zeros of the determinant lead to.
 
     Args:
         chain: of the limb.
         target: exact poses of the tip (B, 4, 4).
         guess: (B, 6), to which the nearest branch comes first.
+        beside: by the way of ``across``.
     """
     starts = range(0, max(len(target), 1), BLOCK)
-    blocks = [_candidates(chain, target[i : i + BLOCK], guess[i : i + BLOCK], i) for i in starts]
+    blocks = [_candidates(chain, target[i : i + BLOCK], guess[i : i + BLOCK], i, beside) for i in starts]
     return Candidates(*map(np.concatenate, zip(*blocks, strict=True)))
 
 
-def _candidates(chain: SerialChain, target: Array, guess: Array, first: int) -> Candidates:
+def _candidates(chain: SerialChain, target: Array, guess: Array, first: int, beside: bool) -> Candidates:
     """Those of a block of samples, from the number of the first one on."""
-    table = run(equations(chain), {"target": target})["table"]
+    table = run(equations(chain, beside), {"target": target})["table"]
     x = equal_angles(ANGLES)
     waves = np.stack([np.ones(ANGLES), np.cos(x), np.sin(x)], axis=1)
     matrices = (waves @ table.swapaxes(0, 1).reshape(3, -1)).reshape(ANGLES, len(target), -1)
     owner, zero = _zeros(run(values(), {"matrix": matrices})["value"][..., 0].T)
     circle = np.stack([np.cos(zero), np.sin(zero)], axis=1)
     given = {"target": target[owner], "guess": guess[owner], "circle": circle, "table": table[owner]}
-    out = run(branch(chain), given)
+    out = run(branch(chain, beside), given)
     error, worst, key = (out[name][:, 0] for name in ("error", "worst", "key"))
     order = np.lexsort((key, owner))
     parts = (part[order] for part in (owner + first, out["q"], error, worst, key))
@@ -207,10 +257,9 @@ def zero(order: int) -> Program:
 
 
 @per_chain
-def equations(chain: SerialChain) -> Program:
+def equations(chain: SerialChain, beside: bool = False) -> Program:
     """The table of ``Elimination`` for a pose of the tip."""
-    way = elimination(chain)
-    assert way is not None
+    way = _way(chain, beside)
     recorder = Recorder(
         identifier(chain.limb, "equations"),
         f"Six equations in two joints of {chain.limb}: coefficients of 1, cosine and sine of a third joint.",
@@ -229,10 +278,9 @@ def values() -> Program:
 
 
 @per_chain
-def branch(chain: SerialChain) -> Program:
+def branch(chain: SerialChain, beside: bool = False) -> Program:
     """The positions of a limb for one zero of the determinant."""
-    way = elimination(chain)
-    assert way is not None
+    way = _way(chain, beside)
     recorder = Recorder(
         identifier(chain.limb, "branch"),
         f"Joint positions of {chain.limb} for an angle of one joint at which six equations have a common"
