@@ -25,6 +25,7 @@ from screwkin.kinematics.positions import (
     successive_displacement,
 )
 from screwkin.kinematics.serial_chain import SerialChain
+from screwkin.model.records import LIMIT_TOLERANCE
 from screwkin.model.robot import Limb, Robot
 from screwkin.model.state import State
 
@@ -134,7 +135,7 @@ def _refuse_other_branch(
     """Refuse samples on another branch than home's.
 
     Raises:
-        LimitError: names limb, sample and time, and the joint that meets its limit on the way.
+        LimitError: names limb, sample and time, and the joint that meets its limit on the way, if one does.
     """
     other = np.flatnonzero(on_other_branch(robot, targets, solution, limb, free))
     if not len(other):
@@ -154,6 +155,13 @@ def _refuse_other_branch(
     joint = joints[worst]
     factor, unit = (1e3, "mm") if joint.type == "prismatic" else (180 / np.pi, "deg")
     when = f"{limb.name}, sample {sample} (t = {float(plan.time[sample]):.3f} s)"
+    if max(beyond) <= LIMIT_TOLERANCE:
+        raise LimitError(
+            f"{when}: it is bent the other way than at home, and would pass a singular posture on the way"
+            " there. Move the target, or bend the posture home as this sample",
+            limb.name,
+            sample,
+        )
     limits = f"limits {factor * joint.lower:.1f} to {factor * joint.upper:.1f} {unit}"
     raise LimitError(
         f"{when}: {joint.name} at {factor * float(near[worst]):.1f} {unit}, {limits}; bent the other way the"

@@ -102,3 +102,16 @@ def test_a_trajectory_of_another_robot_tells_lacking_and_foreign_joints(
 ) -> None:
     with pytest.raises(InputError, match=r"is without left_hip_roll.* foreign x0"):
         sk.zmp(sk.load_robot("poppy12"), replace(walked, joint_names=tuple(f"x{i}" for i in range(18))))
+
+
+def test_a_limb_on_another_branch_within_its_limits_is_refused_without_naming_a_joint(monkeypatch) -> None:
+    import screwkin.gait.reach
+
+    def all_others(robot, targets, solution, limb, free):
+        return np.ones(len(solution.state.q), dtype=bool)
+
+    monkeypatch.setattr(screwkin.gait.reach, "on_other_branch", all_others)
+    robot = sk.load_robot("bioloid")
+    with pytest.raises(LimitError, match=r"sample 0 \(t = 0.000 s\): it is bent the other way") as refused:
+        sk.walk(robot, sk.load_gait("walk"), 1)
+    assert not any(name in str(refused.value) for name in robot.joint_names)
