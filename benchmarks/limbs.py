@@ -168,13 +168,13 @@ def main(arguments: list[str] | None = None) -> int:
     asked = parser.parse_args(arguments)
     pin_threads()
     warnings.simplefilter("ignore")
+    asked.output.parent.mkdir(parents=True, exist_ok=True)
     rows = []
     for path in asked.files:
         for row in rows_of(path, asked.poses):
             rows.append(row)
             print(row, flush=True)
-    asked.output.parent.mkdir(parents=True, exist_ok=True)
-    asked.output.write_text(page_of(rows), encoding="utf-8")
+        asked.output.write_text(page_of(rows), encoding="utf-8")
     return 0
 
 
