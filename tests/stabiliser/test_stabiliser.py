@@ -130,6 +130,18 @@ def test_its_phase_is_that_of_the_plan(robot: Robot, walk: StabilisedWalk, cours
         np.testing.assert_allclose(memory(course).com, com, atol=0.012)
 
 
+def test_a_slow_walk_of_a_tall_robot_stays_with_its_plan() -> None:
+    """Open loop, in steps of six time constants: what the reference lacked would grow by hundreds in each."""
+    tall = sk.load_robot("poppy12")
+    plan = sk.walk(tall, sk.load_gait("poppy12-preview"), steps=4)
+    walk = stabilised(tall, plan)
+    assert walk.rhythm.period * walk.rhythm.w > 6.0
+    walking = [c for c in walked(walk, len(walk.heights) - 1) if c.landed < len(walk.steps) - 1]
+    for course in walking[::10]:
+        com = [np.interp(course.time, plan.time, x) for x in plan.com[:, :2].T]
+        np.testing.assert_allclose(memory(course).com, com, atol=0.15 * walk.rhythm.apart)
+
+
 def test_commands_allow_for_servos_as_those_of_the_plan(
     robot: Robot, plan: Trajectory, walk: StabilisedWalk, courses: States
 ) -> None:
