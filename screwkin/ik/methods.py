@@ -122,7 +122,8 @@ def _by_branches(
 ) -> LimbSolutions:
     """All branches; where there is none, if wanted, what Newton's method comes nearest to the target with."""
     solutions = branch_solutions(chain, target, guess, settings.tolerances, batch)
-    lost = np.flatnonzero(~solutions.valid.reshape(len(target), -1).any(axis=1))
+    valid = solutions.valid.reshape(len(target), solutions.valid.shape[-1])
+    lost = np.flatnonzero(~valid.any(axis=1))
     if nearest and len(lost):
         few = replace(settings, starts=min(settings.starts, STARTS))
         part = solve_limb(chain, target[lost], "newton", guess[lost], few, (len(lost),))

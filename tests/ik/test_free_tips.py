@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import screwkin as sk
 from screwkin.algebra.se3 import as_array, unstack
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.ik.closed import closed_form
+from screwkin.ik.implicit import limb_in_jax
 from screwkin.ik.methods import solve_limb
 from screwkin.ik.numeric import IkSettings
 from screwkin.kinematics.serial_chain import SerialChain, forward, residual
@@ -130,6 +132,18 @@ def test_rounded_legs_of_five_joints_find_their_own_poses(
 @pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 20))])
 def test_legs_of_five_joints_of_any_geometry_find_their_own_poses(seed: int) -> None:
     assert_own_poses_are_solved(general_leg(seed), seed, (), 400)
+
+
+def test_no_poses_have_no_solutions_and_jax_arrays_follow() -> None:
+    chain = rounded_leg(3, 4e-6)
+    T = as_array(forward(chain.screws, unstack(np.full((2, 5), 0.2)), chain.tip)[0], (2,))
+    none = solve_limb(chain, T[:0], "auto", np.zeros((0, 5)), IkSettings(), (0,))
+    assert none.method == "branches"
+    assert none.q.shape[::2] == (0, 5)
+    with jax.enable_x64(True):
+        found = limb_in_jax(chain, jnp.asarray(T), "auto", np.zeros(5), IkSettings(), True)
+    wanted = solve_limb(chain, T, "auto", np.zeros((2, 5)), IkSettings(), (2,))
+    np.testing.assert_allclose(found.best, wanted.best, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", LEGS)
