@@ -82,10 +82,14 @@ def across(chain: SerialChain) -> tuple[Vector, Elimination] | None:
     low, high = box(chain)
     q = (low + spread(6, POSES, 0) * (high - low)) * own
     tips, _ = forward(chain.screws, unstack(q), chain.tip)
-    ways = [way for way in eliminations(chain) if own[_joint(way)]]
-    errors = [float(np.quantile(_errors(way, tips, q), 0.9)) for way in ways]
-    best = int(np.argmin(errors))
-    return (chain.screws[int(own.argmax())].s, ways[best]) if errors[best] <= ROUGHLY else None
+    normal = chain.screws[int(own.argmax())].s
+    for near, enough in ((chain, USABLE), (_stirred(chain), ROUGHLY)):
+        ways = [way for way in eliminations(near) if own[_joint(way)]]
+        errors = [float(np.quantile(_errors(way, tips, q), 0.9)) for way in ways]
+        best = int(np.argmin(errors))
+        if errors[best] <= enough:
+            return normal, ways[best]
+    return None
 
 
 def _joint(way: Elimination) -> int:
