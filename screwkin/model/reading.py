@@ -95,12 +95,8 @@ def read_table(text: str, path: str, symbolic: bool = False) -> RobotRecord:
 
 
 def _servo_faults(table: CheckedTable) -> Iterator[Fault]:
-    """Those of ``[servos]``; where names and connections have faults, none that would only echo them."""
-    rows = [row for _, row in table.rows.good("joint")]
-    still = [row.name for row in rows if row.passive or row.mimic is not None]
-    driven = [name for name in table.joints if name not in still]
-    complete = not (table.structural or table.rows["closure"])
-    return servo_faults(table.rows.servos, Mounted(driven, still, complete))
+    """Those of ``[servos]``; a joint may still lack its servo, and which ones have motors the bus judges."""
+    return servo_faults(table.rows.servos, Mounted([*table.joints], complete=False))
 
 
 def _with_meshes_of(folder: Path, link: Link) -> Link:

@@ -32,8 +32,8 @@ KEYS = (
 class Mounted:
     """Joints as ``[servos]`` may name them.
 
-    driven: names of those with motors. still: of those without one. complete: whether ``driven`` has only
-    joints that need a servo; within loops that is not read off the rows.
+    driven: names of those with motors. still: of those without one. complete: whether each of ``driven``
+    needs an id: a bus needs them all, a table may be read before the last servo is mounted.
     """
 
     driven: Sequence[str]

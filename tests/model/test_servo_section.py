@@ -61,11 +61,6 @@ def id_beyond_the_bus(servos: Servos) -> tuple[str, str]:
     return "ids.right_knee: is 253", "from 0 to 252"
 
 
-def joint_without_id(servos: Servos) -> tuple[str, str]:
-    del servos["ids"]["left_knee"]
-    return "ids: has none for left_knee", "every joint an id"
-
-
 def id_of_no_joint(servos: Servos) -> tuple[str, str]:
     servos["ids"]["rihgt_knee"] = next(i for i in range(252) if i not in servos["ids"].values())
     return "ids.rihgt_knee: is no joint", "Did you mean 'right_knee'?"
@@ -106,7 +101,6 @@ FAULTS = (
     unknown_model_of_a_joint,
     id_given_twice,
     id_beyond_the_bus,
-    joint_without_id,
     id_of_no_joint,
     unknown_key,
     direction_of_three,
@@ -157,9 +151,20 @@ def test_servos_of_mirrored_and_passive_joints():
     passive = MINI.replace('name = "right_knee"', 'name = "right_knee"\npassive = true')
     text = passive + "\n[servos]\nids = { right_hip = 1, left_hip = 2 }\n"
     assert parse_robot(text).servos["ids"] == {"right_hip": 1, "left_hip": 2}
-    (fault,) = faults_of(text.replace("left_hip = 2", "left_hip = 2, left_knee = 3"))
+    robot = parse_robot(
+        text.replace("left_hip = 2", 'left_hip = 2, left_knee = 3 }\nmodels = { left_hip = "AX-12A"')
+    )
+    fault = next(fault for fault in map_faults(robot) if fault.key == "ids.left_knee")
     fix = "Joints with motors are right_hip, left_hip"
     assert fault == Fault("[servos]", "ids.left_knee", "is turned by no motor", fix)
+
+
+def test_a_joint_without_servo_is_a_fault_of_the_bus_alone():
+    """A neck that is not yet mounted keeps no robot from walking."""
+    ids = {name: i for i, name in enumerate(MINI_JOINTS) if name != "left_knee"}
+    robot = parse_robot(with_servos({"model": "AX-12A", "ids": ids}))
+    (fault,) = map_faults(robot)
+    assert (fault.key, fault.found) == ("ids", "has none for left_knee")
 
 
 def test_joints_that_a_failed_mirror_would_have_made_are_not_called_unknown():
