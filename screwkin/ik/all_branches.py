@@ -15,20 +15,14 @@ from screwkin.compiler.program import Program, Recorder
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.compiler.run import run
 from screwkin.ik.closed import EXACT, SAME, conditioned, first_of_its_kind, refined
-from screwkin.ik.eliminated import (
-    Candidates,
-    eliminated,
-    elimination,
-    elimination_programs,
-    exact,
-    planar,
-)
+from screwkin.ik.eliminated import Candidates, eliminated, elimination_programs
 from screwkin.ik.elimination import BRANCHES
 from screwkin.ik.on_limits import on_limits
 from screwkin.ik.polish import FOLD, NEAR, ROUGH, both_sides, from_guess, iterated, steps, unfolded
 from screwkin.ik.rank import INSIDE
 from screwkin.ik.relative import relative
 from screwkin.ik.solutions import KINDS, LimbSolutions, ordered
+from screwkin.ik.ways import across, elimination, exact
 from screwkin.kinematics.serial_chain import SerialChain, per_chain
 from screwkin.model.records import LIMIT_TOLERANCE
 
@@ -81,10 +75,13 @@ def branch_solutions(
         return _with_held_tip(chain, target, guess, tolerances, batch)
     if by_relative(chain):
         return careful_solutions(chain, *_near_relative(chain, target), target, guess, tolerances, batch)
-    found = eliminated(chain, target, guess)
-    shared = np.flatnonzero(planar(chain, target))
-    if len(shared):
-        found = _together(found, eliminated(chain, target[shared], guess[shared], True), shared)
+    way, plane = elimination(chain), across(chain)
+    assert way is not None
+    found, shared = eliminated(chain, way, target, guess), np.empty(0, dtype=int)
+    if plane is not None and (near := plane.near(target)).any():
+        shared = np.flatnonzero(near)
+        others = eliminated(chain, plane.way, target[shared], guess[shared])
+        found = _together(found, others, shared)
     place = np.arange(len(found.sample)) - np.searchsorted(found.sample, found.sample)
     solutions = _at_once(chain, found, place, len(target), batch)
     at = np.union1d(_open(found, len(target), tolerances), shared)
@@ -253,5 +250,7 @@ def relative_branches(chain: SerialChain) -> Program:
 def branch_programs(chain: SerialChain) -> list[Program]:
     """What ``branch_solutions`` runs for a limb."""
     chain = of_six(chain)
-    own = [relative_branches(chain)] if by_relative(chain) else elimination_programs(chain)
-    return [*own, steps(chain)]
+    way = elimination(chain)
+    if way is None or by_relative(chain):
+        return [relative_branches(chain), steps(chain)]
+    return [*elimination_programs(chain, way), steps(chain)]

@@ -24,7 +24,7 @@ from screwkin.algebra.screws import Screw, carry, displacement
 from screwkin.algebra.se3 import Pose, Rotation, Vector, cross, norm
 from screwkin.ik.carried_line import CarriedLine, numbers
 from screwkin.ik.subproblems import turn_onto
-from screwkin.kinematics.serial_chain import SerialChain
+from screwkin.kinematics.serial_chain import SerialChain, per_chain
 
 BRANCHES = 16
 """Largest number of solutions of six revolute joints (Primrose 1986)."""
@@ -60,6 +60,11 @@ class Elimination:
     angles: Array
     offset: Array
     conditioning: float
+
+    @property
+    def joint(self) -> int:
+        """The joint in which is eliminated, by its number in the chain."""
+        return 5 - self.given if self.backwards else self.given
 
     def displacement(self, target: Pose) -> Pose:
         """How far the last link is displaced as the chain is walked, in the frame of the elimination."""
@@ -191,13 +196,15 @@ def _across(s: Vector) -> Vector:
     return aside / norm(aside)
 
 
-def eliminations(chain: SerialChain) -> list[Elimination]:
+@per_chain
+def eliminations(chain: SerialChain) -> tuple[Elimination, ...]:
     """The six ways to eliminate: in every joint."""
-    ways = []
-    for backwards in (False, True):
-        walked = chain.reversed if backwards else chain
-        ways += [_elimination(chain, walked.screws, backwards, given) for given in (2, 1, 0)]
-    return ways
+    walks = ((False, chain), (True, chain.reversed))
+    return tuple(
+        _elimination(chain, walked.screws, backwards, given)
+        for backwards, walked in walks
+        for given in (2, 1, 0)
+    )
 
 
 def _elimination(chain: SerialChain, walked: Sequence[Screw], backwards: bool, given: int) -> Elimination:
