@@ -40,8 +40,8 @@ def pictures(
 ) -> list[Picture]:
     """Pictures (height, width, 3) of K states, the camera gliding along.
 
-    Links show their shapes; without any that can be read their boxes, and without these nothing. On a slope
-    the camera is tilted with the floor.
+    Links show their shapes; without any that can be read their boxes, and without these sticks from joint to
+    joint. On a slope the camera is tilted with the floor.
 
     Args:
         robot: of numbers.

@@ -1,4 +1,4 @@
-"""What pictures show of a robot: the triangles of its shapes, and boxes or lines of links without any."""
+"""What pictures show of a robot: the triangles of its shapes, and boxes or sticks of links without any."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from screwkin.model.urdf import link_colours
 
 STONE = (0.62, 0.60, 0.56)
 """Colour of blocks on the floor."""
+_STICK = 0.012  # thickness of a link without shapes or boxes, in sizes of the robot
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +57,7 @@ def robot_size(robot: Robot) -> float:
 def lines_of(robot: Robot, name: str) -> list[Array]:
     """Ends (2, 3) [m] of the lines from a link's joint to the joints, closures and tips that it carries.
 
-    In the zero pose, in base axes; of the base link from its first joint.
+    In the zero pose, in base axes; of the base link from their middle.
     """
     ends = [as_array(joint.screw.s0) for joint in robot.tree if joint.parent == name]
     ends += [as_array(limb.frame.p) for limb in robot.limbs if limb.link == name]
@@ -66,12 +67,12 @@ def lines_of(robot: Robot, name: str) -> list[Array]:
     if name in robot.joint_above:
         start = as_array(robot.tree[robot.joint_above[name]].screw.s0)
     elif ends:
-        start = ends[0]
+        start = np.mean(ends, axis=0)
     return [np.stack([start, end]).astype(float) for end in ends if np.linalg.norm(end - start) > 1e-6]
 
 
 def solids_of(robot: Robot, cell: float) -> Solids:
-    """Shapes for pictures, else those of collision, else boxes, for every link.
+    """Every link's shapes for pictures, else those of collision, else boxes, else sticks to what it carries.
 
     What cannot be read is a warning (``RobotRemark``), one for all of it.
 
@@ -87,13 +88,36 @@ def solids_of(robot: Robot, cell: float) -> Solids:
         shown = _triangles(link, upright, cell, unread)
         for corners, colours in shown:
             triangles.append((i, corners, np.where(np.isnan(colours), own, colours)))
-        for box in () if shown else link.boxes:
-            boxes.append((i, box_points(box)[None], own[None]))
+        if not shown:
+            solid = np.array([box_points(box) for box in link.boxes] or _sticks(robot, link.name))
+            boxes.append((i, solid.reshape(-1, 8, 3), np.tile(own, (len(solid), 1))))
     if unread:
         first, *others = unread
         more = f", and {len(others)} more files" if others else ""
         warnings.warn(f"{robot.name}: not in pictures: {first}{more}", RobotRemark, stacklevel=3)
     return Solids(_part(boxes, 8), _part(triangles, 3))
+
+
+def bar_corners(segments: Array, thickness: float) -> Array:
+    """Corners (N, 8, 3) of bars of a square section, in the order of ``box_points``.
+
+    Args:
+        segments: (N, 2, 3) ends, apart from each other [m].
+        thickness: of the bars [m].
+    """
+    start, end = np.asarray(segments, dtype=float).reshape(-1, 2, 3).swapaxes(0, 1)
+    along = end - start
+    least = np.eye(3)[np.argmin(np.abs(along), axis=-1)]
+    across, other = np.cross(along, least), np.cross(along, np.cross(along, least))
+    sides = [v * (thickness / 2) / np.linalg.norm(v, axis=-1, keepdims=True) for v in (across, other)]
+    corners = [
+        point + i * sides[0] + j * sides[1] for point in (start, end) for i in (-1, 1) for j in (-1, 1)
+    ]
+    return np.stack(corners, axis=1)
+
+
+def _sticks(robot: Robot, name: str) -> Array:
+    return bar_corners(np.array(lines_of(robot, name)), _STICK * robot_size(robot))
 
 
 def with_blocks(solids: Solids, terrain: Terrain) -> Solids:

@@ -14,15 +14,13 @@ from screwkin.dynamics.terrain import FLAT, Terrain
 from screwkin.kinematics.positions import link_displacements
 from screwkin.model.robot import Robot
 from screwkin.model.state import reference_base, reference_posture
-from screwkin.model.urdf import link_colours
-from screwkin.sim.solids import Part, lines_of, robot_size, solids_of, with_blocks
-from screwkin.viewer.strokes import BOX_FACES, bars, joined
+from screwkin.sim.solids import Part, robot_size, solids_of, with_blocks
+from screwkin.viewer.strokes import BOX_FACES, joined
 
 STANDING = -1
 """Index of what no link carries: the blocks on the floor."""
 FINE, COARSE = 1 / 400, 1 / 60
 """Edge of the cubes that meshes are coarsened to, in sizes of the robot: on a screen, and in a page."""
-_STICK = 0.012  # thickness of a link without shapes or boxes, in sizes of the robot
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,16 +51,8 @@ def pieces_of(robot: Robot, fineness: float = FINE, terrain: Terrain = FLAT) -> 
         terrain: with blocks that are shown too.
     """
     solids = with_blocks(solids_of(robot, fineness * robot_size(robot)), terrain)
-    seen = {int(link) for part in (solids.boxes, solids.triangles) for link in part.links}
     pieces = [*_pieces(solids.boxes, BOX_FACES), *_pieces(solids.triangles, np.arange(3)[None])]
-    pieces = [_on_plane(piece, terrain) if piece.link == STANDING else piece for piece in pieces]
-    paint, thick = link_colours(robot), _STICK * robot_size(robot)
-    for i, link in enumerate(robot.links):
-        if i not in seen:
-            red, green, blue = _bytes(np.array(paint[link.name][:3])).tolist()
-            lines = lines_of(robot, link.name)
-            pieces += [Piece(i, *bars(np.array(lines), thick), (red, green, blue))] if lines else []
-    return pieces
+    return [_on_plane(piece, terrain) if piece.link == STANDING else piece for piece in pieces]
 
 
 def displacements(robot: Robot, T_world_base: Array, q: Array) -> Array:

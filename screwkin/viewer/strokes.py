@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
+from screwkin.sim.solids import bar_corners
 
 Triangles = tuple[Array, NDArray[np.int64]]
 """Vertices (V, 3) [m], and faces (F, 3) as their indices."""
@@ -36,15 +37,7 @@ def bars(segments: Array, thickness: float) -> Triangles:
         segments: (N, 2, 3) ends, apart from each other [m].
         thickness: of the bars [m].
     """
-    start, end = np.asarray(segments, dtype=float).reshape(-1, 2, 3).swapaxes(0, 1)
-    along = end - start
-    least = np.eye(3)[np.argmin(np.abs(along), axis=-1)]
-    across, other = _unit(np.cross(along, least)), _unit(np.cross(along, np.cross(along, least)))
-    half = thickness / 2
-    corners = [
-        point + half * (i * across + j * other) for point in (start, end) for i in (-1, 1) for j in (-1, 1)
-    ]
-    return joined(np.stack(corners, axis=1), BOX_FACES)
+    return joined(bar_corners(segments, thickness), BOX_FACES)
 
 
 def ribbons(segments: Array, width: float) -> Triangles:

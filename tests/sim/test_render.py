@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 import screwkin as sk
-from screwkin.algebra.se3 import UNTURNED, Pose, Vector
+from screwkin.algebra.se3 import UNTURNED, Pose, Vector, as_array
 from screwkin.errors import OutputError, RobotRemark
 from screwkin.model.meshes import hull_faces
 from screwkin.model.records import Shape
@@ -21,6 +21,7 @@ from screwkin.model.shapes import box_points
 from screwkin.model.urdf import ORANGE, SLATE, WHITE
 from screwkin.sim.camera import Camera, Picture, _milliseconds, following, save_gif, save_png, view_of
 from screwkin.sim.render import pictures
+from screwkin.sim.solids import solids_of
 from screwkin.sim.triangles import draw_triangles
 
 SMALL = Camera(width=160, height=120)
@@ -92,15 +93,36 @@ def test_torso_thighs_and_calves_are_white_slate_and_orange(robot: Robot) -> Non
     assert middle.max() < 255 * WHITE[0]
 
 
+@pytest.mark.parametrize("name", ["bioloid", "poppy12"])
+def test_links_without_boxes_are_sticks_from_their_joint_to_all_that_they_carry(name: str) -> None:
+    robot = sk.load_robot(name)
+    bare = replace(robot, links=tuple(replace(link, boxes=(), shapes=()) for link in robot.links))
+    solids = solids_of(bare, 0.01).boxes
+    carried = {
+        link: [joint.screw.s0 for joint in bare.tree if joint.parent == link] for link in bare.link_names
+    }
+    for limb in bare.limbs:
+        carried[limb.link].append(limb.frame.p)
+    for joint in bare.tree:
+        sticks = solids.corners[solids.links == bare.link_names.index(joint.child)]
+        ends = [sticks[:, :4].mean(axis=1), sticks[:, 4:].mean(axis=1)]
+        for point in carried[joint.child]:
+            span = np.array([as_array(joint.screw.s0), as_array(point)])
+            apart = [np.linalg.norm(end - at, axis=-1) for end, at in zip(ends, span, strict=True)]
+            assert np.ptp(span, axis=0).max() < 1e-6 or np.hypot(*apart).min() < 1e-9
+    assert (np.ptp(one_picture(bare).astype(int), axis=-1) > 25).sum() > 40
+
+
 def test_a_box_hides_what_stands_behind_it_and_the_first_of_two_equal_faces_is_seen(robot: Robot) -> None:
     """Drawn in table order, whatever is nearer must win; where two faces coincide they must not flicker."""
-    base = robot.links[0]
+    unseen = Box(Vector(0, 0, 0), Vector(1e-6, 1e-6, 1e-6))
 
     def scene(*boxes: Box) -> Robot:
-        small = replace(base, boxes=boxes[:1])
-        others = [replace(robot.links[1], boxes=boxes[1:2]), replace(robot.links[2], boxes=boxes[2:])]
-        rest = [replace(link, boxes=()) for link in robot.links[3:]]
-        return replace(robot, links=(small, *others, *rest))
+        shown = [*boxes, *[unseen] * (len(robot.links) - len(boxes))]
+        return replace(
+            robot,
+            links=tuple(replace(link, boxes=(box,)) for link, box in zip(robot.links, shown, strict=True)),
+        )
 
     wide = Box(Vector(0, 0, 0), Vector(0.2, 0.2, 0.2))
     ahead = Box(Vector(0.15, -0.15, 0), Vector(0.05, 0.05, 0.1))
