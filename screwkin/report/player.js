@@ -46,11 +46,13 @@
   function robot(THREE) {
     const renderer = new THREE.WebGLRenderer({ canvas: view, antialias: true, alpha: true });
     const camera = new THREE.PerspectiveCamera(38, 1.5, 0.01, 100), scene = new THREE.Scene();
-    const { size, joints, links, pieces, tile } = header.robot;
+    const { size, middle, radius, joints, links, pieces, tile } = header.robot;
     camera.up.set(0, 0, 1);
-    camera.position.set(1.5 * size, -1.7 * size, 1.35 * size);
+    const wide = view.clientWidth / Math.max(view.clientHeight, 1), half = Math.tan((19 * Math.PI) / 180);
+    const away = radius / Math.sin(Math.atan(half * Math.min(wide || 1, 1))); // all of the robot, in a narrow page too
+    camera.position.set(0.62, -0.7, 0.35).setLength(away).add(new THREE.Vector3(0, 0, middle));
     const orbit = new THREE.OrbitControls(camera, view);
-    orbit.target.set(0, 0, 0.5 * size);
+    orbit.target.set(0, 0, middle);
     orbit.enableZoom = true;
     scene.add(new THREE.AmbientLight(0xffffff, 1.7));
     const lamp = new THREE.DirectionalLight(0xffffff, 2.2);

@@ -10,7 +10,7 @@ from __future__ import annotations
 import base64
 import json
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from html import escape
 from importlib.resources import files
@@ -28,7 +28,7 @@ from screwkin.gait.ground import ground_of
 from screwkin.model.robot import Robot
 from screwkin.report.style import GCOM, PLAIN, ZMP
 from screwkin.sim.solids import robot_size
-from screwkin.viewer.scene import COARSE, pieces_of
+from screwkin.viewer.scene import COARSE, STANDING, Piece, displacements, pieces_of
 
 UNIT = 1e-6
 """Of stored lengths and angles [m, rad]."""
@@ -36,6 +36,7 @@ ABSENT = -(2**31)
 """What stands for a number that is none."""
 RATE = 50.0
 """Samples per second of a motion in a page, at most."""
+_SEEN = 25  # samples in which the camera's ball holds the robot
 
 
 class Packed:
@@ -114,8 +115,12 @@ def _robot(account: Account, packed: Packed) -> dict[str, Any]:
                 "offset": float(getattr(joint, "offset", 0.0)),
             }
         )
+    pieces = pieces_of(robot, COARSE, ground_of(account.trajectory))
+    middle, radius = _around(account, pieces)
     return {
         "size": _shown_size(robot, account),
+        "middle": middle,
+        "radius": radius,
         "tile": 0.1,
         "links": list(names),
         "roots": [names.index(robot.base_link)],
@@ -128,13 +133,29 @@ def _robot(account: Account, packed: Packed) -> dict[str, Any]:
                 "vertices": packed.add(piece.vertices, 1e-5),
                 "faces": packed.add(piece.faces, 1.0),
             }
-            for piece in pieces_of(robot, COARSE, ground_of(account.trajectory))
+            for piece in pieces
         ],
     }
 
 
+def _around(account: Account, pieces: Sequence[Piece]) -> tuple[float, float]:
+    """Height of the middle and radius [m] of a ball that goes with the base and holds all of the robot."""
+    plan, robot = account.trajectory, account.robot
+    rows = np.linspace(0, len(plan.time) - 1, _SEEN).round().astype(int)
+    Ts = displacements(robot, plan.T_world_base[rows], account.motion.q[rows])
+    over = plan.T_world_base[rows][:, None, :3, 3] * [1.0, 1.0, 0.0]
+    own = [
+        piece.vertices @ Ts[:, piece.link, :3, :3].swapaxes(-1, -2) + Ts[:, piece.link, None, :3, 3] - over
+        for piece in pieces
+        if piece.link != STANDING
+    ]
+    points = np.concatenate([np.zeros((1, 3)), *(part.reshape(-1, 3) for part in own)])
+    middle = 0.5 * float(points[:, 2].min() + points[:, 2].max())
+    return middle, float(np.linalg.norm(points - [0.0, 0.0, middle], axis=1).max())
+
+
 def _shown_size(robot: Robot, account: Account) -> float:
-    """What the camera's distance is measured in [m]: the robot's size or the height of its waist."""
+    """What marks are measured in [m]: the robot's size or the height of its waist."""
     return max(robot_size(robot), float(account.trajectory.T_world_base[0, 2, 3]))
 
 

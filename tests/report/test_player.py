@@ -15,7 +15,9 @@ from hypothesis.extra.numpy import array_shapes, arrays
 import screwkin as sk
 from screwkin.algebra.screws import Screw, displacement
 from screwkin.algebra.se3 import Vector, as_array
+from screwkin.model.shapes import box_points
 from screwkin.report.player import UNIT, Packed, player_html
+from screwkin.viewer.scene import displacements
 
 
 def stored(data, described):
@@ -137,3 +139,19 @@ def test_a_robot_of_a_sly_name_stays_text(account, parts):
     header, _, _ = parts
     assert "</" not in json.dumps(header)
     assert header["robot"]["links"] == list(account.robot.link_names)
+
+
+def test_the_camera_sees_all_of_the_robot_whatever_it_is_drawn_of(account, parts):
+    """The bundled robot's boxes, and the tips, which are no corner of theirs, at every sample."""
+    middle, radius = (parts[0]["robot"][key] for key in ("middle", "radius"))
+    robot, plan = account.robot, account.trajectory
+    carried = displacements(robot, plan.T_world_base, plan.q)
+    corners = [
+        (box_points(box) @ carried[:, i, :3, :3].swapaxes(1, 2) + carried[:, i, None, :3, 3])
+        for i, link in enumerate(robot.links)
+        for box in link.boxes
+    ]
+    points = np.concatenate([*corners, *(T[:, None, :3, 3] for T in plan.T_world_tip.values())], axis=1)
+    points[..., :2] -= plan.T_world_base[:, None, :2, 3]
+    far = np.linalg.norm(points - [0.0, 0.0, middle], axis=-1).max()
+    assert far < 1.02 * radius < 1.25 * far
