@@ -8,10 +8,12 @@ from typing import Annotated
 
 import typer
 
-from screwkin.cli.options import AsJson
+from screwkin.cli.options import AsJson, FittingGait
 from screwkin.cli.output import print_json, progress_bar, say
+from screwkin.cli.walk import limbed
 from screwkin.errors import InputError
 from screwkin.gait.files import default_gait, load_gait
+from screwkin.gait.fitting import fitting_gait
 from screwkin.gait.record import Gait, gait_from_dict
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
@@ -33,6 +35,7 @@ def view(
         str | None,
         typer.Option(metavar="NAME|FILE", help="The gait that a robot walks; default: ROBOT-… or walk."),
     ] = None,
+    auto: FittingGait = False,
     steps: Annotated[int, typer.Option(help="Steps of that walk.")] = 4,
     host: Annotated[
         str, typer.Option(help="Address to listen at; 0.0.0.0 for all of the computer's.")
@@ -51,7 +54,7 @@ def view(
     """
     if film is not None:
         check_film(film)
-    session = _session(what, gait, steps)
+    session = _session(what, gait, auto, steps)
     if film is not None:
         return _filmed(session, what, film, as_json)
 
@@ -66,11 +69,14 @@ def view(
     return 0
 
 
-def _session(what: str, gait: str | None, steps: int) -> Session:
+def _session(what: str, gait: str | None, auto: bool, steps: int) -> Session:
     """What the command line asks to see."""
+    if auto and gait is not None:
+        raise InputError("--auto chooses the gait; leave --gait out")
     if Path(what).suffix.lower() == ".npz":
-        if gait is not None:
-            raise InputError("a trajectory has its gait recorded; leave --gait out, or name a robot")
+        if auto or gait is not None:
+            option = "--auto" if auto else "--gait"
+            raise InputError(f"a trajectory has its gait recorded; leave {option} out, or name a robot")
         from screwkin.analysis.account import recorded_robot
 
         trajectory = load_trajectory(what)
@@ -78,6 +84,9 @@ def _session(what: str, gait: str | None, steps: int) -> Session:
         own, count = _recorded_gait(trajectory), trajectory.meta.get("steps")
         return with_motion(begun(robot, own, count if isinstance(count, int) else steps), trajectory)
     robot = load_robot(what)
+    if auto:
+        robot = robot if robot.limbs else limbed(robot)
+        return begun(robot, fitting_gait(robot), steps)
     if gait is None and not walks(robot):
         return begun(robot)
     return begun(robot, load_gait(gait or default_gait(robot.name)), steps)

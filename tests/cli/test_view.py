@@ -4,6 +4,7 @@ import pytest
 
 import screwkin as sk
 import screwkin.cli.view as verb
+from screwkin.gait.fitting import fitting_gait
 
 
 @pytest.fixture
@@ -31,6 +32,13 @@ def test_a_robot_a_linkage_and_a_motion_are_shown(cli, shown, walked):
     assert (linkage.gait, linkage.track) == (None, None)
     assert (motion.gait.name, motion.steps) == ("paper", 2)
     assert motion.track.duration == pytest.approx(sk.load_trajectory(walked / "trajectory.npz").duration)
+
+
+def test_auto_shows_the_gait_that_walk_would_fit(cli, shown, refused, walked):
+    assert cli("view", "poppy12", "--auto").code == 0
+    assert shown[0].gait.to_dict() == fitting_gait(sk.load_robot("poppy12")).to_dict()
+    assert "leave --gait out" in refused(cli("view", "poppy12", "--auto", "--gait", "walk"), 2)
+    assert "leave --auto out" in refused(cli("view", walked / "trajectory.npz", "--auto"), 2)
 
 
 def test_what_cannot_be_shown_is_refused(cli, refused, shown, walked, tmp_path):
