@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,10 +17,10 @@ from screwkin.kinematics.serial_chain import SerialChain, forward, per_chain
 
 POSES = 96
 """Poses at which the ways to eliminate are compared."""
+MOSTLY = 0.9
+"""Share of them whose errors say whether a way serves."""
 RARELY = 0.98
-"""Share of them whose errors are compared: ways that are as exact mostly differ in the rest."""
-RARE_ENOUGH = 1e-6
-"""Such an error [rad] with which a way is taken without trying others."""
+"""Share of them whose errors order ways: those that are as exact mostly differ in the rest."""
 EXACT_ENOUGH = 1e-9
 """Error of the given joint [rad], at nine of ten poses, that costs no branches but those that nearly fall
 together."""
@@ -38,16 +39,22 @@ PLANAR = 0.1
 
 
 @per_chain
-def elimination(chain: SerialChain) -> Elimination | None:
-    """The most exact way to eliminate for a limb, None where there is none.
+def usable_ways(chain: SerialChain) -> tuple[Elimination, ...]:
+    """The ways to eliminate that serve a limb, the most exact one first.
 
-    Where all determinants vanish for all poses alike, as of limbs with several pairs of axes that meet, it is
-    that of a limb whose axes are moved by so little that Newton's method makes up for it.
+    Where all determinants vanish for all poses alike, as of limbs with several pairs of axes that meet, they
+    are those of a limb whose axes are moved by so little that Newton's method makes up for it.
     """
-    best, error = _most_exact(chain)
-    if best is None or error > USABLE:
-        best, error = _most_exact(_stirred(chain))
-    return best if error <= ROUGHLY else None
+    for near, enough in ((chain, USABLE), (_stirred(chain), ROUGHLY)):
+        rated = _rated(near)
+        if rated and rated[0].mostly <= enough:
+            return tuple(rating.way for rating in rated if rating.mostly <= enough)
+    return ()
+
+
+def elimination(chain: SerialChain) -> Elimination | None:
+    """The most exact way to eliminate for a limb, None where there is none."""
+    return next(iter(usable_ways(chain)), None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,35 +98,40 @@ def across(chain: SerialChain) -> Plane | None:
     tips, _ = forward(chain.screws, unstack(q), chain.tip)
     for near, enough in ((chain, USABLE), (_stirred(chain), ROUGHLY)):
         ways = [way for way in eliminations(near) if own[way.joint]]
-        errors = [float(np.quantile(_errors(way, tips, q), 0.9)) for way in ways]
+        errors = [float(np.quantile(_errors(way, tips, q), MOSTLY)) for way in ways]
         best = int(np.argmin(errors))
         if errors[best] <= enough:
             return Plane(chain, axes[int(own.argmax())], ways[best])
     return None
 
 
-@per_chain
 def exact(chain: SerialChain) -> bool:
     """Whether no branches are missed but those that nearly fall together."""
-    return _most_exact(chain)[1] <= EXACT_ENOUGH
+    return any(rating.mostly <= EXACT_ENOUGH for rating in _rated(chain)[:1])
+
+
+class _Rating(NamedTuple):
+    """A way to eliminate, and its errors [rad]: rare ones, and what nine of ten poses have."""
+
+    rarely: float
+    mostly: float
+    way: Elimination
 
 
 @per_chain
-def _most_exact(chain: SerialChain) -> tuple[Elimination | None, float]:
-    """The way with least errors, rare ones counted, and what they are at nine of ten poses [rad]."""
-    best, least, most = None, np.inf, np.inf
-    if len(chain.screws) == 6 and chain.turning.all():
-        low, high = box(chain)
-        q = low + spread(6, POSES, 0) * (high - low)
-        tips, _ = forward(chain.screws, unstack(q), chain.tip)
-        for way in eliminations(chain):
-            errors = _errors(way, tips, q)
-            error, rare = (float(np.quantile(errors, share)) for share in (0.9, RARELY))
-            if rare < most:
-                best, least, most = way, error, rare
-            if rare <= RARE_ENOUGH:
-                break
-    return best, least
+def _rated(chain: SerialChain) -> tuple[_Rating, ...]:
+    """The six ways, that with least errors first, rare ones counted."""
+    if len(chain.screws) != 6 or not chain.turning.all():
+        return ()
+    low, high = box(chain)
+    q = low + spread(6, POSES, 0) * (high - low)
+    tips, _ = forward(chain.screws, unstack(q), chain.tip)
+    errors = [_errors(way, tips, q) for way in eliminations(chain)]
+    rated = [
+        _Rating(float(np.quantile(error, RARELY)), float(np.quantile(error, MOSTLY)), way)
+        for error, way in zip(errors, eliminations(chain), strict=True)
+    ]
+    return tuple(sorted(rated, key=lambda rating: rating.rarely))
 
 
 @per_chain
