@@ -22,7 +22,7 @@ from screwkin.ik.polish import FOLD, NEAR, ROUGH, both_sides, from_guess, iterat
 from screwkin.ik.rank import INSIDE
 from screwkin.ik.relative import relative
 from screwkin.ik.solutions import KINDS, LimbSolutions, ordered
-from screwkin.ik.ways import across, elimination, exact
+from screwkin.ik.ways import elimination, exact
 from screwkin.kinematics.serial_chain import SerialChain, per_chain
 from screwkin.model.records import LIMIT_TOLERANCE
 
@@ -75,16 +75,10 @@ def branch_solutions(
         return _with_held_tip(chain, target, guess, tolerances, batch)
     if by_relative(chain):
         return careful_solutions(chain, *_near_relative(chain, target), target, guess, tolerances, batch)
-    way, plane = elimination(chain), across(chain)
-    assert way is not None
-    found, shared = eliminated(chain, way, target, guess), np.empty(0, dtype=int)
-    if plane is not None and (near := plane.near(target)).any():
-        shared = np.flatnonzero(near)
-        others = eliminated(chain, plane.way, target[shared], guess[shared])
-        found = _together(found, others, shared)
+    found, again = eliminated(chain, target, guess)
     place = np.arange(len(found.sample)) - np.searchsorted(found.sample, found.sample)
     solutions = _at_once(chain, found, place, len(target), batch)
-    at = np.union1d(_open(found, len(target), tolerances), shared)
+    at = np.union1d(_open(found, len(target), tolerances), again)
     if len(at):
         number = np.full(len(target), -1)
         number[at] = np.arange(len(at))
@@ -122,14 +116,6 @@ def _certified(
     q[lost, 0], error[lost, 0] = q[lost, k], error[lost, k]
     once = np.ones(valid.shape, dtype=int)
     return ordered(chain, "branches", q, valid, error, once, guess, batch)
-
-
-def _together(found: Candidates, others: Candidates, at: Integers) -> Candidates:
-    """Candidates of all samples and those of some, by numbers ``at``; the best of each sample first."""
-    others = others._replace(sample=at[others.sample])
-    both = Candidates(*map(np.concatenate, zip(found, others, strict=True)))
-    order = np.lexsort((both.key, both.sample))
-    return Candidates(*(part[order] for part in both))
 
 
 def _at_once(
@@ -250,7 +236,5 @@ def relative_branches(chain: SerialChain) -> Program:
 def branch_programs(chain: SerialChain) -> list[Program]:
     """What ``branch_solutions`` runs for a limb."""
     chain = of_six(chain)
-    way = elimination(chain)
-    if way is None or by_relative(chain):
-        return [relative_branches(chain), steps(chain)]
-    return [*elimination_programs(chain, way), steps(chain)]
+    own = [relative_branches(chain)] if by_relative(chain) else elimination_programs(chain)
+    return [*own, steps(chain)]

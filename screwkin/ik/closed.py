@@ -260,15 +260,16 @@ def first_of_its_kind(q: Array, error: Array) -> Array:
     """(B, k) bool, False for a branch that is no solution, or repeats a more exact one."""
     valid = error <= EXACT
     pair = np.triu(np.ones((error.shape[1], error.shape[1]), dtype=bool), 1)
-    sample, i, j = (_alike(q[:, :, None, 0], q[:, None, :, 0]) & pair).nonzero()
+    sample, i, j = (alike(q[:, :, None, 0], q[:, None, :, 0]) & pair).nonzero()
     for joint in range(q.shape[-1]):
-        both = _alike(q[sample, i, joint], q[sample, j, joint]) & valid[sample, i] & valid[sample, j]
+        both = alike(q[sample, i, joint], q[sample, j, joint]) & valid[sample, i] & valid[sample, j]
         sample, i, j = sample[both], i[both], j[both]
     worse = np.where(error[sample, j] < error[sample, i], i, j)
     valid[sample, worse] = False
     return np.asarray(valid)
 
 
-def _alike(a: Array, b: Array) -> Array:
+def alike(a: Array, b: Array) -> Array:
+    """Whether angles in (-pi, pi] are those of one branch."""
     apart = np.abs(a - b)
     return np.asarray((apart < SAME) | (apart > 2 * np.pi - SAME))

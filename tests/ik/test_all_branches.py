@@ -19,6 +19,7 @@ from screwkin.ik.methods import solve_limb_arrays
 from screwkin.ik.numeric import IkSettings
 from screwkin.ik.polish import unfolded
 from screwkin.ik.solutions import LimbSolutions
+from screwkin.ik.ways import usable_ways
 from screwkin.kinematics.serial_chain import SerialChain, distance, residual
 from screwkin.kinematics.status import Status
 from tests.ik.legs import Leg, apart, nearly, offset_leg, random_tip, spherical_leg, unit
@@ -144,6 +145,60 @@ def test_the_own_branch_is_found_in_and_beside_a_plane_in_which_all_share_an_ang
         found = solved(chain, leg.reach(q))
         own = ((apart(found.q, q[:, None]) < 1e-6) & found.valid).any(axis=1)
         assert own.mean() > 0.95  # the rest nearly fall together with others
+
+
+def sharing(leg: Leg, chain: SerialChain, joint: int, seed: int) -> np.ndarray | None:
+    """Two positions (2, 6) of one pose in which a joint has the same angle, met along a random line.
+
+    The line's positions are one branch; Newton steps follow another one until the angles cross.
+    """
+    start, end = np.random.default_rng(seed).uniform(LOW, HIGH, (2, 6))
+
+    def at(t: float) -> np.ndarray:
+        return np.asarray(start + t * (end - start))
+
+    def followed(t: float, q: np.ndarray) -> np.ndarray:
+        for _ in range(3):
+            lack, J = residual(chain, q[None], leg.reach(at(t)[None]))
+            q = q + np.linalg.solve(J[0], lack[0])
+        return q
+
+    def ahead(t: float, q: np.ndarray) -> bool:
+        return bool(np.sin(q[joint] - at(t)[joint]) > 0)
+
+    def bisected(low: float, high: float, q: np.ndarray) -> np.ndarray:
+        for _ in range(45):
+            middle = (low + high) / 2
+            new = followed(middle, q)
+            low, high, q = (low, middle, q) if ahead(middle, new) != ahead(low, q) else (middle, high, new)
+        return np.array([at(low), q])
+
+    others = solved(chain, leg.reach(start[None])).q[0]
+    for q in others[np.isfinite(others).all(axis=1) & (apart(others, start) > 1e-3)]:
+        for t in np.arange(40) / 40:
+            new = followed(t + 1 / 40, q)
+            if apart(new, q) > 0.3:
+                break
+            if ahead(t + 1 / 40, new) != ahead(t, q):
+                both = bisected(t, t + 1 / 40, q)
+                if apart(*both[:, [joint]]) < 1e-9 and apart(*both) > 0.05:
+                    return both
+            q = new
+    return None
+
+
+@pytest.mark.parametrize("name", ["pairs", "parallel to 2e-3", "meeting to 2e-3"])
+def test_branches_that_share_the_angle_that_is_eliminated_are_found(name: str) -> None:
+    """There the null vector belongs to neither: another joint tells them apart."""
+    leg, met = LEGS[name], 0
+    chain = limited(leg)
+    for seed in range(4):
+        both = sharing(leg, chain, usable_ways(chain)[0].joint, seed)
+        if both is not None:
+            found, met = solved(chain, leg.reach(both[:1])), met + 1
+            for q in both:
+                assert ((apart(found.q[0], q) < 1e-6) & found.valid[0]).any(), seed
+    assert met
 
 
 @pytest.mark.slow
