@@ -59,8 +59,9 @@ def whole_sentences(app, what, name, obj, options, lines) -> None:
 
 
 def links_out_of_the_site(app, name, source) -> None:
-    """Links to files of the checkout that are no pages become their names."""
+    """Links to results lead to their pages; those to other files of the checkout become their names."""
     if "/" not in name:
+        source[0] = re.sub(r"\(\.\./benchmarks/results/([\w-]+\.md)\)", r"(reference/result-\1)", source[0])
         source[0] = re.sub(r"\[([^\]]*)\]\(\.\./([\w/.-]+)\)", r"\1 (`\2`)", source[0])
 
 

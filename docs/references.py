@@ -331,6 +331,8 @@ def _auto(name: str, kind: str) -> str:
     return f"### {name}\n\n```{{eval-rst}}\n.. {kind}:: screwkin.{name}{members}\n```"
 
 
+RESULTS = Path(__file__).parent.parent / "benchmarks" / "results"
+"""Pages that the commands of benchmarks wrote."""
 PAGES: Mapping[str, Any] = {
     "gallery": gallery.page,
     "tables": robot_tables,
@@ -345,8 +347,10 @@ PAGES: Mapping[str, Any] = {
 def write_all(folder: Path) -> None:
     """Write all pages; those that stay the same keep their time, so that Sphinx reads changed ones only."""
     folder.mkdir(exist_ok=True)
-    for name, written in PAGES.items():
-        path, text = folder / f"{name}.md", written() + "\n"
+    pages = {name: written() + "\n" for name, written in PAGES.items()}
+    pages |= {f"result-{path.stem}": path.read_text(encoding="utf-8") for path in RESULTS.glob("*.md")}
+    for name, text in pages.items():
+        path = folder / f"{name}.md"
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             with atomic_write(path) as file:
                 file.write(text)
