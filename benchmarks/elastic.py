@@ -77,7 +77,6 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.elastic", description="What a cycle costs.")
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "results")
     asked = parser.parse_args()
-    pin_threads()
     text = page(sk.load_robot("bioloid"))
     asked.output.mkdir(parents=True, exist_ok=True)
     (asked.output / "elastic.md").write_text(text, encoding="utf-8")
@@ -86,5 +85,6 @@ def main() -> int:
 
 
 if __name__ == "__main__":
+    pin_threads()  # what starts anew then imports libraries that read it
     keep_memory()
     sys.exit(main())

@@ -166,7 +166,6 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--poses", type=int, help=f"poses of every limb; default {POSES}, or {NUMERIC}")
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "results" / "limbs.md")
     asked = parser.parse_args(arguments)
-    pin_threads()
     warnings.simplefilter("ignore")
     asked.output.parent.mkdir(parents=True, exist_ok=True)
     rows = []
@@ -179,5 +178,6 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
+    pin_threads()  # what starts anew then imports libraries that read it
     keep_memory()
     sys.exit(main())
