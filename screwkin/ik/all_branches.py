@@ -14,7 +14,16 @@ from screwkin.algebra.arrays import Array, Integers
 from screwkin.compiler.program import Program, Recorder
 from screwkin.compiler.records import identifier, pose_input
 from screwkin.compiler.run import run
-from screwkin.ik.closed import EXACT, SAME, conditioned, first_of_its_kind, refined
+from screwkin.ik.closed import (
+    EXACT,
+    SAME,
+    STILL,
+    clearness,
+    completed,
+    conditioned,
+    first_of_its_kind,
+    refined,
+)
 from screwkin.ik.eliminated import Candidates, eliminated, elimination_programs
 from screwkin.ik.elimination import BRANCHES
 from screwkin.ik.on_limits import on_limits
@@ -48,15 +57,19 @@ def by_relative(chain: SerialChain) -> bool:
 
 @per_chain
 def of_six(chain: SerialChain) -> SerialChain:
-    """The limb, one of four or five joints with a tip that is free to turn about its own axes.
+    """The limb, one of four or five joints with further ones that turn its tip.
 
-    Of these axes those are taken about which the six joints are best conditioned, as of closed forms.
+    Of their axes those are taken about which branches of the relative are furthest apart, or else, about the
+    tip's own, the six joints best conditioned.
     """
     missing = 6 - len(chain.screws)
     if missing not in (1, 2) or not chain.turning.all():
         return chain
+    near = [(form, whole) for whole in completed(chain) if (form := relative(whole)) is not None]
+    if near:
+        return max(near, key=lambda pair: clearness(pair[0], 6 - missing))[1]
     freed = [chain.freed(free, range(missing)) for free in combinations(("rx", "ry", "rz"), missing)]
-    return max((whole for whole in freed if has_branches(whole)), key=conditioned, default=chain)
+    return max((whole for whole in freed if elimination(whole) is not None), key=conditioned, default=chain)
 
 
 def branch_solutions(
@@ -100,9 +113,15 @@ def _with_held_tip(
     own, count = len(chain.screws), len(target)
     start = np.concatenate([guess, np.zeros((count, 6 - own))], axis=1)
     found = branch_solutions(of_six(chain), target, start, (0.0, 0.0), (count,))
-    q, error = refined(chain, np.nan_to_num(found.q[..., :own]), target, STEPS)
-    for k in range(q.shape[1]):
-        q[:, k] = np.where(error[:, k, None] <= EXACT, on_limits(chain, q[:, k], target, tolerances), q[:, k])
+    turned = (1 - np.cos(found.q[..., own:])).sum(axis=2)
+    still = found.valid & (turned <= STILL)
+    owner, k = (still | ~still.any(axis=1, keepdims=True)).nonzero()
+    q, error = np.nan_to_num(found.q[..., :own]), np.full(still.shape, np.inf)
+    near, far = refined(chain, q[owner, k][:, None], target[owner], STEPS)
+    near, exact_ones = near[:, 0], far[:, 0] <= EXACT
+    if max(tolerances) > LIMIT_TOLERANCE:
+        near[exact_ones] = on_limits(chain, near[exact_ones], target[owner[exact_ones]], tolerances)
+    q[owner, k], error[owner, k] = near, far[:, 0]
     valid = first_of_its_kind(q, error)
     return _certified(chain, q, error, valid, guess, batch)
 
@@ -201,7 +220,7 @@ def _next_to(chain: SerialChain, near: Array, slack: Array, target: Array) -> tu
     """What Newton steps make of a relative's branches (B, k, 6), and of both sides of nearly folded ones."""
     count, k = near.shape[:2]
     starts, present = np.tile(near, (1, 3, 1)), np.ones((count, 3 * k), dtype=bool)
-    folds = slack < FOLD
+    folds = np.abs(slack) < FOLD
     present[:, k:] = np.tile(folds, 2)
     sample, row = folds.nonzero()
     ahead, back = both_sides(chain, near[sample, row], target[sample])

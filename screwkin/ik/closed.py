@@ -6,7 +6,7 @@ walked from the tip to the base. Directions of the axes may be any.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -14,12 +14,21 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.newton import newton
 from screwkin.algebra.scalar import cos, least
-from screwkin.algebra.se3 import Pose, Vector
+from screwkin.algebra.screws import Screw
+from screwkin.algebra.se3 import ZERO, Pose, Vector, unstack
 from screwkin.errors import InputError
 from screwkin.ik import parallel_axes, point_limb, spherical_hip
 from screwkin.ik.family import Branch, Family, Formulas
 from screwkin.ik.starts import box, spread
-from screwkin.kinematics.serial_chain import SerialChain, distance, per_chain, residual, target_of, volume
+from screwkin.kinematics.serial_chain import (
+    SerialChain,
+    distance,
+    forward,
+    per_chain,
+    residual,
+    target_of,
+    volume,
+)
 
 FAMILIES = (
     Family("spherical hip", ("No spherical hip", "no spherical wrist"), spherical_hip.recognise),
@@ -35,6 +44,10 @@ STILL = 1e-6
 """Sum of (1 - cos) of the turns of a tip below which it may stand still."""
 POSITIONS = 64
 """Positions within the limits by which axes of a tip are compared."""
+MOSTLY = 0.1
+"""Share of them whose branches may be nearer to others."""
+ASIDE = 0.5
+"""How far from the tip such axes lie, over the limb's length, that do not pass through it."""
 BLOCK = 4096
 """Samples computed together, which bounds the memory of a large batch."""
 
@@ -123,19 +136,19 @@ _COUNTS = {3: "three", 6: "six"}
 
 
 def _with_free_tip(chain: SerialChain, family: str | None) -> ClosedForm:
-    """The closed form of four or five joints, from that of six of which the last turn the tip about its axes.
+    """The closed form of four or five joints, from that of six of which the last turn the tip.
 
     A branch is one of the limb's where these stand still. Of the axes that serve those are taken about which
-    the six joints are best conditioned.
+    its branches are furthest apart.
 
     Raises:
         InputError: with no axis of the tip there is a closed form.
     """
     n, forms, faults = len(chain.screws), [], []
-    for free in combinations(("rx", "ry", "rz"), 6 - n):
-        longer = chain.freed(free, range(6 - n))
+    for longer in completed(chain):
         try:
-            forms.append((conditioned(longer), closed_form(longer, family=family)))
+            form = closed_form(longer, family=family)
+            forms.append((clearness(form, n), form))
         except InputError as error:
             faults.append(str(error))
     if not forms:
@@ -151,6 +164,40 @@ def _with_free_tip(chain: SerialChain, family: str | None) -> ClosedForm:
 
     formulas = Formulas(lambda D: [still(branch) for branch in form.at(D)], arrays)
     return ClosedForm(chain, f"{form.family}, tip free", False, False, formulas)
+
+
+def completed(chain: SerialChain) -> list[SerialChain]:
+    """Limbs of six joints, of a limb of four or five: further ones turn the tip about axes of its own.
+
+    The axes are parallel to the tip's, through the tip or aside: those through it lie in the plane in which
+    many legs move, where branches share angles.
+    """
+    missing, tip = 6 - len(chain.screws), chain.tip.R
+    wholes = []
+    for free in combinations(("rx", "ry", "rz"), missing):
+        whole = chain.freed(free, range(missing))
+        for aside in (ZERO, tip.x, tip.y, tip.z):
+            shift = aside * (chain.length * ASIDE)
+            moved = (Screw(screw.s, screw.s0 + shift) for screw in whole.screws[-missing:])
+            wholes.append(replace(whole, screws=(*chain.screws, *moved)))
+    return wholes
+
+
+def clearness(form: ClosedForm, own: int) -> float:
+    """How far apart branches of six joints are, mostly, where those beyond the first ``own`` stand still.
+
+    That is the slack of such positions within the limits.
+    """
+    low, high = box(form.chain)
+    q = low + spread(6, POSITIONS, 0) * (high - low)
+    q[:, own:] = 0.0
+    tips, _ = forward(form.chain.screws, unstack(q), form.chain.tip)
+    with np.errstate(all="ignore"):  # branches that are no solutions
+        rows = [np.stack(np.broadcast_arrays(*row, q[:, 0])[:-1], axis=1) for row in form.formula(tips)]
+    branches = np.nan_to_num(np.stack(rows, axis=1))
+    far = np.sin((branches[..., :6] - q[:, None]) / 2) ** 2
+    nearest = far.sum(axis=2).argmin(axis=1)
+    return float(np.quantile(branches[np.arange(POSITIONS), nearest, 6], MOSTLY))
 
 
 def conditioned(chain: SerialChain) -> float:

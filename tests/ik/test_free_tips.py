@@ -18,6 +18,7 @@ from screwkin.ik.closed import closed_form
 from screwkin.ik.implicit import limb_in_jax
 from screwkin.ik.methods import solve_limb
 from screwkin.ik.numeric import IkSettings
+from screwkin.ik.programs import limb_branches
 from screwkin.kinematics.serial_chain import SerialChain, forward, residual
 from screwkin.kinematics.status import Status
 from screwkin.mechanism.followers import followers
@@ -132,6 +133,18 @@ def test_rounded_legs_of_five_joints_find_their_own_poses(
 @pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 20))])
 def test_legs_of_five_joints_of_any_geometry_find_their_own_poses(seed: int) -> None:
     assert_own_poses_are_solved(general_leg(seed), seed, (), 400)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_program_alone_solves_legs_that_lie_in_one_plane(seed: int) -> None:
+    """About axes through the tip two branches would share the hip's angles, and rounding decide."""
+    chain = rounded_leg(seed, 0.0)
+    q = np.random.default_rng(seed).uniform(-1.0, 1.0, (200, 5))
+    T = as_array(forward(chain.screws, unstack(q), chain.tip)[0], (200,))
+    found, _, kind, certified = limb_branches(chain, False)((T, np.zeros(5)))
+    assert (certified[:, 0] > 0.5).mean() > 0.9
+    own = ((apart(found, q[:, None]) < 1e-9) & (kind > 0.5)).any(axis=1)
+    assert own[certified[:, 0] > 0.5].all()
 
 
 def test_no_poses_have_no_solutions_and_jax_arrays_follow() -> None:
