@@ -6,7 +6,7 @@ solutions hold the positions themselves, to 1e-10 rad; inside: the share with a 
 robot that does not stand on two legs has its longest chain measured, of at most seven joints. An arm of more
 than seven joints, as one that begins at the waist has, is also measured from its shoulder on: its last seven.
 
-Time: processor time of one thread for a pose of a batch, in so many rounds: least, median and most.
+Time: processor time of one thread for a pose, of so many batches: least, median and most.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ from screwkin.kinematics.serial_chain import SerialChain, forward, nearest_point
 from screwkin.model.robot import Limb
 from screwkin.model.values import COUPLINGS
 
-ROUNDS = 5
-POSES, NUMERIC = 2_000, 100
+BATCHES = 5
+POSES, NUMERIC = 10_000, 1_000
 """Poses of a limb whose branches are known, and of one that is solved by iterations."""
 OWN = 1e-10
 """Difference [rad] up to which a solution is the own one."""
@@ -50,7 +50,7 @@ SHOULDER = 7
 
 @dataclass(frozen=True)
 class Row:
-    """A limb: its file, name, number of joints, how it is solved, shares, and microseconds of every round."""
+    """A limb: its file, name, number of joints, how it is solved, shares, and microseconds of every batch."""
 
     file: str
     limb: str
@@ -123,16 +123,16 @@ def row_of(file: str, name: str, chain: SerialChain, rest: Array, poses: int | N
     guess, times = np.tile(rest, (count, 1)), []
     for program in limb_programs(chain):
         compile_program(program)
-    for _ in range(ROUNDS):
+    own, inside = np.zeros((2, count), dtype=bool)
+    for part in np.array_split(np.arange(count), min(count, BATCHES)):
         start = time.process_time()
-        found = solve_limb(chain, T, "auto", guess, DEFAULT, (count,))
-        times.append(1e6 * (time.process_time() - start) / count)
-    own = None
-    if branches > 1:
-        apart = np.abs((found.q - q[:, None] + np.pi) % (2 * np.pi) - np.pi).max(axis=-1)
-        own = float(((apart < OWN) & found.valid).any(axis=1).mean())
-    inside = float(found.in_limits.any(axis=1).mean())
-    return Row(file, name, n, family, count, own, inside, tuple(times))
+        found = solve_limb(chain, T[part], "auto", guess[part], DEFAULT, part.shape)
+        times.append(1e6 * (time.process_time() - start) / len(part))
+        apart = np.abs((found.q - q[part, None] + np.pi) % (2 * np.pi) - np.pi).max(axis=-1)
+        own[part] = ((apart < OWN) & found.valid).any(axis=1)
+        inside[part] = found.in_limits.any(axis=1)
+    share = float(own.mean()) if branches > 1 else None
+    return Row(file, name, n, family, count, share, float(inside.mean()), tuple(times))
 
 
 def rows_of(path: Path, poses: int | None = None) -> Iterator[Row]:
@@ -148,7 +148,7 @@ def page_of(rows: Sequence[Row]) -> str:
     facts = description(("numpy",))
     head = ["# Limbs of public robots", "", (__doc__ or "").strip(), ""]
     about = [
-        f"{facts['processor']}, one thread; load {facts['load']} as it was written; {ROUNDS} rounds.",
+        f"{facts['processor']}, one thread; load {facts['load']} as it was written; {BATCHES} batches.",
         "",
     ]
     table = [

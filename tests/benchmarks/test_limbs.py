@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.limbs import ROUNDS, limbs_of, page_of, row_of, rows_of, shouldered
+from benchmarks.limbs import BATCHES, limbs_of, page_of, row_of, rows_of, shouldered
 from screwkin.kinematics.serial_chain import SerialChain
 from screwkin.model.table import parse_robot
 from screwkin.model.urdf import urdf_from_robot
@@ -19,7 +19,7 @@ def test_limbs_of_a_humanoid_are_measured(tmp_path: Path) -> None:
     rows = list(rows_of(file, 20))
     assert {"right_leg", "left_leg"} <= {row.limb for row in rows}
     for row in rows:
-        assert len(row.times) == ROUNDS
+        assert len(row.times) == BATCHES
         assert row.inside == 1.0
         assert row.own in (None, 1.0)
     page = page_of(rows)
