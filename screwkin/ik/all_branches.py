@@ -22,21 +22,21 @@ from screwkin.ik.closed import (
     completed,
     conditioned,
     first_of_its_kind,
-    refined,
 )
 from screwkin.ik.eliminated import Candidates, eliminated, elimination_programs
 from screwkin.ik.elimination import BRANCHES
 from screwkin.ik.on_limits import on_limits
-from screwkin.ik.polish import FOLD, NEAR, ROUGH, both_sides, from_guess, iterated, steps, unfolded
+from screwkin.ik.polish import NEAR, ROUGH, both_sides, from_guess, iterated, steps, unfolded
 from screwkin.ik.rank import INSIDE
-from screwkin.ik.relative import relative
+from screwkin.ik.relative import departure, relative
 from screwkin.ik.solutions import KINDS, LimbSolutions, ordered
 from screwkin.ik.ways import elimination, exact
 from screwkin.kinematics.serial_chain import SerialChain, per_chain
 from screwkin.model.records import LIMIT_TOLERANCE
 
-STEPS = 4
-"""Newton steps of four and five joints from where those of six rest."""
+FOLDED = 100.0
+"""Slack of a relative's branches, over its departure from the limb, below which the limb's own may fall
+together elsewhere."""
 CLEAR = 1e-7
 """Slack of a relative's branches below which rounding decides about them: there its arrays serve."""
 APART = 10 * SAME
@@ -117,11 +117,13 @@ def _with_held_tip(
     still = found.valid & (turned <= STILL)
     owner, k = (still | ~still.any(axis=1, keepdims=True)).nonzero()
     q, error = np.nan_to_num(found.q[..., :own]), np.full(still.shape, np.inf)
-    near, far = refined(chain, q[owner, k][:, None], target[owner], STEPS)
-    near, exact_ones = near[:, 0], far[:, 0] <= EXACT
+    out = run(steps(chain), {"start": q[owner, k], "target": target[owner]})
+    q[owner, k], error[owner, k] = out["q"], out["error"][:, 0]
+    iterated(chain, q, error, target)
+    near, solves = chain.wrapped(q[owner, k]), np.flatnonzero(error[owner, k] <= EXACT)
     if max(tolerances) > LIMIT_TOLERANCE:
-        near[exact_ones] = on_limits(chain, near[exact_ones], target[owner[exact_ones]], tolerances)
-    q[owner, k], error[owner, k] = near, far[:, 0]
+        near[solves] = on_limits(chain, near[solves], target[owner[solves]], tolerances)
+    q[owner, k] = near
     valid = first_of_its_kind(q, error)
     return _certified(chain, q, error, valid, guess, batch)
 
@@ -220,7 +222,7 @@ def _next_to(chain: SerialChain, near: Array, slack: Array, target: Array) -> tu
     """What Newton steps make of a relative's branches (B, k, 6), and of both sides of nearly folded ones."""
     count, k = near.shape[:2]
     starts, present = np.tile(near, (1, 3, 1)), np.ones((count, 3 * k), dtype=bool)
-    folds = np.abs(slack) < FOLD
+    folds = np.abs(slack) < FOLDED * departure(chain)
     present[:, k:] = np.tile(folds, 2)
     sample, row = folds.nonzero()
     ahead, back = both_sides(chain, near[sample, row], target[sample])
@@ -254,6 +256,6 @@ def relative_branches(chain: SerialChain) -> Program:
 
 def branch_programs(chain: SerialChain) -> list[Program]:
     """What ``branch_solutions`` runs for a limb."""
-    chain = of_six(chain)
-    own = [relative_branches(chain)] if by_relative(chain) else elimination_programs(chain)
-    return [*own, steps(chain)]
+    whole = of_six(chain)
+    own = [relative_branches(whole)] if by_relative(whole) else elimination_programs(whole)
+    return [*own, *{id(limb): steps(limb) for limb in (whole, chain)}.values()]

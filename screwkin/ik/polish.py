@@ -28,8 +28,7 @@ ROUNDS = 12
 LONGEST = 0.3
 """Largest change of an angle in such a step [rad]."""
 FOLD = 0.01
-"""Slack of a relative's branches below which the limb's own may fall together elsewhere: a hundred times the
-largest difference of the two limbs, by which slack differs."""
+"""Square of the longest step [rad] to the sides of a fold."""
 SIDE = 1e-3
 """Step [rad] from which the curvature at a fold is computed."""
 
@@ -71,8 +70,8 @@ def iterated(chain: SerialChain, q: Array, error: Array, target: Array) -> None:
     """Repeat Newton steps where they help, in place: near a singular position many are needed.
 
     Args:
-        chain: of six joints.
-        q: branches (B, k, 6).
+        chain: of n joints, six or fewer.
+        q: branches (B, k, n).
         error: of them (B, k) [m and rad, norm].
         target: exact poses of the tip (B, 4, 4).
     """

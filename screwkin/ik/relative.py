@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from screwkin.algebra.screws import Screw
-from screwkin.algebra.se3 import dot, norm
+from screwkin.algebra.se3 import cross, dot, norm
 from screwkin.ik.closed import ClosedForm, recognised
 from screwkin.kinematics.axis_geometry import meeting, parallel
 from screwkin.kinematics.serial_chain import SerialChain, per_chain
@@ -29,6 +29,16 @@ def relative(chain: SerialChain) -> ClosedForm | None:
     if len(chain.screws) != 6 or not chain.turning.all():
         return None
     return recognised(_meeting(_parallel(chain)))
+
+
+@per_chain
+def departure(chain: SerialChain) -> float:
+    """How far the relative's axes lie from the limb's: largest angle [rad] or distance over its length."""
+    form = relative(chain)
+    assert form is not None
+    pairs = list(zip(chain.screws, form.chain.screws, strict=True))
+    turned = max(float(norm(a.s - b.s)) for a, b in pairs)
+    return max(turned, *(float(norm(cross(a.s, b.s0 - a.s0))) / chain.length for a, b in pairs))
 
 
 def _parallel(chain: SerialChain) -> SerialChain:
