@@ -4,6 +4,7 @@ Ankles are spared from the start: the ZMP keeps as near to them as their torque 
 touch at home are set apart. Legs without a roll axis at the ankle lean (``gait.steering``), as a waist that
 shifts would tilt their soles. Where the usual pace will not do, these follow:
 
+- of legs that lean, quicker steps, the ZMP nearer to the ankles, then on the inner half of the soles;
 - slower steps, for quick joints, and quicker ones, which need less sway;
 - quick steps whose ZMP keeps to the inner half of the sole, then with the feet apart, for hips that turn in
   little;
@@ -76,6 +77,7 @@ STEP_SIZES = (
     StepSize(0.2, 0.06, (0.93, 0.95, 0.96, 0.94, 0.9, 0.87, 0.83, 0.78, 0.7)),
     StepSize(0.1, 0.04, (0.97, 0.95, 0.94, 0.93, 0.9, 0.87, 0.83, 0.78, 0.7)),
     StepSize(0.05, 0.03, (0.98, 0.96, 0.95, 0.94, 0.93, 0.9, 0.87, 0.83, 0.78, 0.7)),
+    StepSize(0.03, 0.02, (0.98, 0.96, 0.95, 0.94, 0.93, 0.9, 0.87, 0.83, 0.78, 0.7)),
 )
 """From large steps to small ones on straighter legs."""
 
@@ -108,6 +110,9 @@ def other_paces(robot: Robot, usual: Gait) -> Iterator[Gait]:
     upright = usual.replace(lateral="shift", stand=1, period=PERIODS[0])
     if _without_ankle_roll(robot):
         yield from (_leaning(usual, period) for period in LEANING[1:])
+        if usual.numbers["ahead"] > LEAST_AHEAD:
+            yield from (_leaning(usual.replace(ahead=LEAST_AHEAD), period) for period in LEANING)
+        yield from (_leaning(usual.replace(inward=INWARD), period) for period in LEANING)
         yield upright
         yield from (_quick(upright, period) for period in QUICK_PERIODS)
         return
