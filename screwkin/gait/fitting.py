@@ -22,6 +22,7 @@ from screwkin.gait.coarse import Coarse, coarse_walks
 from screwkin.gait.feed_forward import walking_torques
 from screwkin.gait.paces import STEP_SIZES, StepSize, other_paces, usual_pace
 from screwkin.gait.record import Gait
+from screwkin.gait.sideways import sideways
 from screwkin.gait.walk import planned_walk
 from screwkin.model.inertias import inertia_matrix
 from screwkin.model.robot import Robot
@@ -35,6 +36,8 @@ MORE_JUDGED = 4
 """Gaits judged after the first that will do, for one that uses less torque."""
 HEIGHTS_JUDGED = 3
 """Of a size, heights of the hips that are judged: the next one where there is no walk at the one before."""
+OUTSIDE = "the ZMP comes"
+"""How a reason of a ZMP outside the support polygon begins."""
 _STEPS = 3
 _SPREAD = 2.0  # leg lengths: radii of gyration beyond it are in other units
 
@@ -143,7 +146,7 @@ def _judged(robot: Robot, gait: Gait) -> _Judged:
 def _unbalanced(trajectory: Trajectory) -> Iterator[str]:
     margin = float(trajectory.margin.min())
     if not margin > 0:
-        yield f"the ZMP comes {-1e3 * margin:.1f} mm out of the support polygon"
+        yield f"{OUTSIDE} {-1e3 * margin:.1f} mm out of the support polygon"
 
 
 def _overloaded(robot: Robot, trajectory: Trajectory, torques: Array) -> Iterator[str]:
@@ -162,7 +165,9 @@ def _refusal(robot: Robot, base: Gait, tried: Sequence[_Judged]) -> str:
     if tried:
         best = min(tried, key=lambda judged: (judged.cut_short, len(judged.reasons)))
         size = f"stride {best.gait.stride:.3g} m, Tc {best.gait.Tc:.3g} s"
-        return f"{robot.name}: no gait fits; with {size}: {'; '.join(best.reasons)}{_spread(robot, base)}"
+        why = "; ".join(best.reasons)
+        aside = f". {why_not}" if OUTSIDE in why and (why_not := str(sideways(robot))) else ""
+        return f"{robot.name}: no gait fits; with {size}: {why}{aside}{_spread(robot, base)}"
     smallest = base.replace(stride=f"{STEP_SIZES[-1].stride:g}*leg", lift=f"{STEP_SIZES[-1].lift:g}*leg")
     reasons = _judged(robot, smallest).reasons
     why = "; ".join(reasons) or "joints would be faster than they can"
