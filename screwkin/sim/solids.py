@@ -55,24 +55,30 @@ def robot_size(robot: Robot) -> float:
 
 
 def lines_of(robot: Robot, name: str) -> list[Array]:
-    """Ends (2, 3) [m] of the lines from a link's joint to the joints, closures and tips that it carries.
+    """Ends (2, 3) [m] of the lines that stand for a link without shapes, in the zero pose, in base axes.
 
-    In the zero pose, in base axes; of the base link from their middle.
+    From its joint to the joints, closures, tips and corners of soles that it carries, and around the soles;
+    to its centre of mass where it carries nothing. Of the base from their middle, to its centre of mass, too.
     """
+    link, is_base = robot.links[robot.link_names.index(name)], name not in robot.joint_above
+    tips = {limb.name: as_array(limb.frame.p) for limb in robot.limbs if limb.link == name}
+    soles = [np.array([as_array(p) for p in sole.corners]) for sole in robot.soles if sole.limb in tips]
     ends = [as_array(joint.screw.s0) for joint in robot.tree if joint.parent == name]
-    ends += [as_array(limb.frame.p) for limb in robot.limbs if limb.link == name]
+    ends += [*tips.values(), *(corner for corners in soles for corner in corners)]
     for closure in robot.closures:
         ends += [as_array(closure.frame_a.p)] if closure.link_a == name else []
         ends += [as_array(closure.frame_b.p)] if closure.link_b == name else []
-    if name in robot.joint_above:
-        start = as_array(robot.tree[robot.joint_above[name]].screw.s0)
-    elif ends:
-        start = np.mean(ends, axis=0)
-    return [np.stack([start, end]).astype(float) for end in ends if np.linalg.norm(end - start) > 1e-6]
+    middle = np.mean(ends, axis=0) if ends else as_array(link.com)
+    start = middle if is_base else as_array(robot.tree[robot.joint_above[name]].screw.s0)
+    if link.mass and (is_base or not ends):
+        ends.append(as_array(link.com))
+    lines = [np.array([start, end]) for end in ends]
+    lines += [edge for corners in soles for edge in np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)]
+    return [line.astype(float) for line in lines if np.linalg.norm(line[1] - line[0]) > 1e-6]
 
 
 def solids_of(robot: Robot, cell: float) -> Solids:
-    """Every link's shapes for pictures, else those of collision, else boxes, else sticks to what it carries.
+    """Every link's shapes for pictures, else those of collision, else boxes, else sticks (``lines_of``).
 
     What cannot be read is a warning (``RobotRemark``), one for all of it.
 

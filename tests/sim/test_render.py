@@ -93,23 +93,31 @@ def test_torso_thighs_and_calves_are_white_slate_and_orange(robot: Robot) -> Non
     assert middle.max() < 255 * WHITE[0]
 
 
-@pytest.mark.parametrize("name", ["bioloid", "poppy12"])
-def test_links_without_boxes_are_sticks_from_their_joint_to_all_that_they_carry(name: str) -> None:
+@pytest.mark.parametrize("name", ["bioloid", "poppy12", "linkages/four-bar"])
+def test_a_robot_without_boxes_is_one_figure_of_sticks_through_all_that_its_table_places(name: str) -> None:
     robot = sk.load_robot(name)
     bare = replace(robot, links=tuple(replace(link, boxes=(), shapes=()) for link in robot.links))
-    solids = solids_of(bare, 0.01).boxes
-    carried = {
-        link: [joint.screw.s0 for joint in bare.tree if joint.parent == link] for link in bare.link_names
-    }
-    for limb in bare.limbs:
-        carried[limb.link].append(limb.frame.p)
-    for joint in bare.tree:
-        sticks = solids.corners[solids.links == bare.link_names.index(joint.child)]
-        ends = [sticks[:, :4].mean(axis=1), sticks[:, 4:].mean(axis=1)]
-        for point in carried[joint.child]:
-            span = np.array([as_array(joint.screw.s0), as_array(point)])
-            apart = [np.linalg.norm(end - at, axis=-1) for end, at in zip(ends, span, strict=True)]
-            assert np.ptp(span, axis=0).max() < 1e-6 or np.hypot(*apart).min() < 1e-9
+    sticks = solids_of(bare, 0.01).boxes.corners
+    ends = np.stack([sticks[:, :4].mean(axis=1), sticks[:, 4:].mean(axis=1)], axis=1)
+    carrying = {joint.parent for joint in bare.tree} | {limb.link for limb in bare.limbs}
+    carrying |= {one for closure in bare.closures for one in (closure.link_a, closure.link_b)}
+    placed = [joint.screw.s0 for joint in bare.tree] + [limb.frame.p for limb in bare.limbs]
+    placed += [corner for sole in bare.soles for corner in sole.corners]
+    placed += [link.com for link in bare.links if link.mass and link.name not in carrying - {bare.base_link}]
+    for point in placed:
+        assert np.linalg.norm(ends - as_array(point), axis=-1).min() < 1e-6
+    reached = np.zeros(len(ends), dtype=bool)
+    reached[0] = True
+    for _ in ends:
+        apart = np.linalg.norm(ends[:, :, None, None] - ends[reached][None, None], axis=-1)
+        reached |= apart.min(axis=(1, 2, 3)) < 1e-6
+    assert reached.all()
+
+
+@pytest.mark.parametrize("name", ["bioloid", "poppy12"])
+def test_sticks_are_seen(name: str) -> None:
+    robot = sk.load_robot(name)
+    bare = replace(robot, links=tuple(replace(link, boxes=(), shapes=()) for link in robot.links))
     assert (np.ptp(one_picture(bare).astype(int), axis=-1) > 25).sum() > 40
 
 
