@@ -148,10 +148,10 @@ class Gains:
     pull: share of the DCM's error beyond dead that the pendulum takes over in a cycle, ahead and aside;
     rate_filter: of the error's rate, share of the newest; lean: share of the trunk's lean by which the
     swing foot turns; lean_filter: share of the newest; level_time: time constant of what lasts, the floor's
-    slope and the CoM's gap [s], which is left alone; sole: share of the sole, less margin, in which the
-    ZMP may go; step: share of what is left that the foot's place takes, up to reach ahead and aside;
-    timing: share of it that the step's time takes, within sooner to later of the planned time, by at most
-    two cycles a cycle; largest: error of the DCM beyond which it counts no more.
+    slope and the CoM's gap [s]; sole: share of the sole,
+    less margin, in which the ZMP may go; step: share of what is left that the foot's place takes, up to reach
+    ahead and aside; timing: share of it that the step's time takes, within sooner to later of the planned
+    time, by at most two cycles a cycle; largest: error of the DCM beyond which it counts no more.
     dead and margin are shares of half the sole's width, reach and largest of the CoM's height.
     """
 
@@ -323,17 +323,21 @@ def step_landing(
     room = gains.sole * (hx - gains.margin * hy), gains.sole * (hy - gains.margin * hy)
     aim = pair_within(held, pair_difference(here, room), pair_sum(here, room))
     goal = pair_sum(goal, aim, late)
-    period = _timed(rhythm, gains, course, goal[1] - aim[1], dcm[1] - aim[1], feedback)
+    h, wide = rhythm.com_height, 2.0 * rhythm.apart
+    rx, ry = gains.reach[0] * h, gains.reach[1] * h
+    back, ahead = least(nominal[0], 0.0) - rx, larger(nominal[0], 0.0) + rx
+    spare = back - nominal[0], ahead - nominal[0]
+    period = _timed(
+        rhythm, gains, course, pair_difference(goal, aim), pair_difference(dcm, aim), spare, feedback
+    )
     growth = exponential(w * larger(period - tau, dt))
     end = pair_sum(pair_sum(aim, pair_difference(dcm, aim), growth), pair_difference(zmp, aim), -ramp)
     free = pair_sum(nominal, pair_difference(end, goal), gains.step * feedback)  # what the ZMP leaves
-    h, wide = rhythm.com_height, 2.0 * rhythm.apart
-    rx, ry = gains.reach[0] * h, gains.reach[1] * h
     close = larger(wide - ry, 2.0 * (hy - rhythm.middle[1]) + APART * h)
     quick = QUICK * h, QUICK * h
     slow = -QUICK * h, -QUICK * h
     bounded = (
-        clipped(free[0], nominal[0] - rx, nominal[0] + rx),
+        clipped(free[0], back, ahead),
         -side * clipped(-side * free[1], close, wide + ry),
     )
     share = (tau - rhythm.both) / larger(period - rhythm.both, 1e-3)
@@ -344,20 +348,27 @@ def step_landing(
 
 
 def _timed(
-    rhythm: Rhythm, gains: Gains, course: StepState, wanted: Scalar, now: Scalar, feedback: Scalar
+    rhythm: Rhythm, gains: Gains, course: StepState, wanted: Pair, now: Pair, spare: Pair, feedback: Scalar
 ) -> Scalar:
     """Duration of the step with which the DCM aside grows from where it is to where the next step wants it.
 
-    Both are beside the ZMP: where that suffices, the step takes its time. It changes by at most two
-    cycles a cycle, once both feet have stood for their share, and not in the last moment.
+    Both are beside the ZMP: where that suffices, the step takes its time; but it lands before the DCM has run
+    further ahead than the foot can reach, and soon where the DCM falls out over the foot that stands. It
+    changes by at most two cycles a cycle, once both feet have stood for their share, and not in the last
+    moment. spare: how far the foot can land behind and ahead of its planned place.
     """
-    w, T, tau = rhythm.w, rhythm.period, course.tau
-    moment = MOMENT * rhythm.dt
+    w, T, tau, h = rhythm.w, rhythm.period, course.tau, rhythm.com_height
+    moment, nought = MOMENT * rhythm.dt, 1e-6 * h * h
     most, free = exponential(2.0 * rhythm.dt * w), (tau > rhythm.both) & (course.period - tau > moment)
     growth = exponential(w * larger(course.period - tau, rhythm.dt))
-    runs = wanted * now > 1e-6 * rhythm.com_height * rhythm.com_height
-    ratio = clipped(where(runs, wanted / where(runs, now * growth, 1.0), most), 1.0 / most, most)
-    change = feedback * gains.timing / w * logarithm(ratio)
+
+    def ratio(goal: Scalar, here: Scalar, otherwise: Scalar) -> Scalar:
+        runs = goal * here > nought
+        return clipped(where(runs, goal / where(runs, here * growth, 1.0), otherwise), 1.0 / most, most)
+
+    reach = where(now[0] > 0.0, spare[1], spare[0])
+    fits = least(ratio(wanted[1], now[1], 1.0 / most), ratio(wanted[0] + reach, now[0], most))
+    change = feedback * gains.timing / w * logarithm(fits)
     timed = larger(clipped(course.period + change, gains.sooner * T, gains.later * T), tau + moment)
     return where(free, timed, course.period)
 

@@ -108,6 +108,30 @@ def test_even_steps_are_a_fixed_point_of_the_law(
     np.testing.assert_allclose(far, 0.0, atol=1e-3)
 
 
+def _landed(ahead: float, aside: float, side: float) -> float:
+    """Duration of a step in which the DCM begins so far beside the foot that stands, inwards and ahead."""
+    period, tau, held, place, zmp = RHYTHM.period, RHYTHM.both, (0.0, 0.0), (0.05, -side * 0.084), (0.0, 0.0)
+    com, rate = (ahead, -side * aside), (0.0, 0.0)
+    while tau < period - 1e-9:
+        dcm = com[0] + rate[0] / RHYTHM.w, com[1] + rate[1] / RHYTHM.w
+        course = _Course(tau, period, side, held, place)
+        decided = law.step_landing(RHYTHM, Gains(), course, dcm, zmp, [(0.05, 0.0)] * 2, 1.0)  # type: ignore[arg-type]
+        period, held, place, zmp = decided.period, decided.held, decided.place, decided.zmp
+        com, rate = law.pendulum(com, rate, zmp, RHYTHM.w, CYCLE)
+        tau += CYCLE
+    return period
+
+
+@given(ahead=st.floats(-0.1, 0.1), aside=st.floats(-0.03, 0.04), side=st.sampled_from([1.0, -1.0]))
+def test_no_step_waits_while_the_robot_falls_beyond_its_reach(
+    ahead: float, aside: float, side: float
+) -> None:
+    """One that falls ahead, backwards or out over its foot lands soon, whatever the way aside asks for."""
+    took, usual = _landed(ahead, aside, side), RHYTHM.period
+    far = abs(ahead) > 0.06 or aside < -0.022
+    assert took <= (usual if far else Gains().later * usual + CYCLE) + 1e-9
+
+
 @given(
     size=st.floats(0.3, 8.0), tau=st.floats(0.0, 0.39), side=st.sampled_from([1.0, -1.0]),
     values=st.lists(st.floats(-0.08, 0.08), min_size=8, max_size=8),
