@@ -8,7 +8,7 @@ and steps to take. The CoM follows from the attitude and the legs' kinematics, o
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from screwkin.algebra.scalar import Scalar, atan2, cos, larger, sin, sqrt, where
 from screwkin.algebra.se3 import Pose, Rotation, Vector, X, Y, Z, leaves, rotate
@@ -46,10 +46,10 @@ class Memory:
 
     mode: starting, stepping or stopping; tau: time in it [s]; period: of the step in course [s]; side: of the
     foot that stands, +1 left; stance, other: feet on the floor, the other one where it stood at last (x, y
-    [m], yaw [rad]); com, rate, zmp: of the internal pendulum; held, place: see ``landing``; seen: 1 if the
-    cycle before measured; gap, gap_rate: of the CoM from the pendulum, measured, beside what lasts of it
-    (lasting); error: of the DCM; slope, lean: of the floor and of the trunk beside it, about x and y [rad];
-    waist: x, y.
+    [m], yaw [rad]); com, rate, zmp: of the internal pendulum; held, place: see ``landing``; seen: side of
+    the foot by which the CoM was measured last, 0 if never; gap, gap_rate: of the CoM from the pendulum,
+    measured, beside what lasts of it (lasting); error: of the DCM; slope, lean: of the floor and of the
+    trunk beside it, about x and y [rad]; waist: x, y.
     """
 
     mode: Scalar
@@ -101,29 +101,37 @@ class Ahead:
 
 @dataclass(frozen=True)
 class _Seen:
-    """The CoM on the floor as measured; attitude with the plan's heading; whether it holds."""
+    """The CoM on the floor, measured by the foot of a side; attitude with the plan's heading; if it holds."""
 
     com: Pair
     attitude: Rotation
     valid: Scalar
+    side: Scalar
 
 
-def _measured(body: WalkingBody, rhythm: Rhythm, memory: Memory, senses: Sensed, swings: Scalar) -> _Seen:
-    """Where the CoM is, by the foot that supports: the stance foot, or the other where that is in the air."""
+def _measured(
+    body: WalkingBody, rhythm: Rhythm, memory: Memory, senses: Sensed, swings: Scalar, landing: Scalar
+) -> _Seen:
+    """Where the CoM is, by the foot that has stood longest, or the other where that one is in the air.
+
+    With both on the floor it is the foot about to swing: servos are late, so the other may still be landing.
+    """
     D = link_displacements(body.robot, senses.q)
     com = senses.attitude @ mass_center(body.robot, D)
-    left = memory.side > 0.0
+    older = where(landing, -memory.side, memory.side)
+    left = older > 0.0
     feet = [pose_in_base(body.robot, D, tip) for tip in body.tips]
     views = [
         [*_column(senses.attitude @ foot.R.x), *_column(senses.attitude @ foot.R.y),
          *_column(senses.attitude @ foot.p), *pressure, force]
         for foot, pressure, force in zip(feet, senses.pressure, senses.force, strict=True)
     ]  # fmt: skip
-    stance, other = either(left, views[1], views[0]), either(left, views[0], views[1])
-    aloft = (stance[-1] < 0.25 * (stance[-1] + other[-1])) & (other[-1] > 0.0)
-    xx, xy, xz, yx, yy, yz, px, py, pz, kx, ky, _ = either(aloft, other, stance)
-    at = either(aloft, memory.other, memory.stance)
-    outward = where(aloft, -memory.side, memory.side) * rhythm.middle[1]
+    stands, other = either(left, views[1], views[0]), either(left, views[0], views[1])
+    aloft = (stands[-1] < 0.25 * (stands[-1] + other[-1])) & (other[-1] > 0.0)
+    xx, xy, xz, yx, yy, yz, px, py, pz, kx, ky, _ = either(aloft, other, stands)
+    side = where(aloft, -older, older)
+    at = either(side * memory.side > 0.0, memory.stance, memory.other)
+    outward = side * rhythm.middle[1]
     (hx, hy), mx = rhythm.half, rhythm.middle[0]
     k = pair_within((kx, ky), (mx - hx, outward - hy), (mx + hx, outward + hy))
     pivot = Vector(px + xx * k[0] + yx * k[1], py + xy * k[0] + yy * k[1], pz + xz * k[0] + yz * k[1])
@@ -134,7 +142,7 @@ def _measured(body: WalkingBody, rhythm: Rhythm, memory: Memory, senses: Sensed,
     turn = Rotation(Vector(c, s, 0), Vector(-s, c, 0), Z)
     arm = turn @ (com - pivot)
     place = pair_sum(pair_sum((at[0], at[1]), pair_turned(k, at[2])), (arm.x, arm.y))
-    return _Seen(place, turn @ senses.attitude @ body.T_waist_base.R.T, where(swings & aloft, 0.0, 1.0))
+    return _Seen(place, turn @ senses.attitude @ body.T_waist_base.R.T, where(swings & aloft, 0.0, 1.0), side)
 
 
 def _column(v: Vector) -> tuple[Scalar, Scalar, Scalar]:
@@ -156,11 +164,12 @@ def _estimated(rhythm: Rhythm, gains: Gains, memory: Memory, seen: _Seen) -> tup
     off = pair_difference(seen.com, memory.com)
     lasting = pair_sum(memory.lasting, pair_difference(off, memory.lasting), dt / gains.level_time)
     gap = pair_difference(off, lasting)
-    old = either(memory.seen > 0.5, memory.gap, gap)
     far, dead = gains.largest * rhythm.com_height, gains.dead * rhythm.half[1]
     fast = 1.3 * far * rhythm.w
-    speed = pair_within(((gap[0] - old[0]) / dt, (gap[1] - old[1]) / dt), (-fast, -fast), (fast, fast))
-    rate = pair_sum(memory.gap_rate, pair_difference(speed, memory.gap_rate), gains.rate_filter)
+    moved = pair_difference(gap, memory.gap)
+    speed = pair_within((moved[0] / dt, moved[1] / dt), (-fast, -fast), (fast, fast))
+    share = where(memory.seen * seen.side > 0.5, gains.rate_filter, 0.0)  # another foot: no speed by it
+    rate = pair_sum(memory.gap_rate, pair_difference(speed, memory.gap_rate), share)
     whole = pair_sum(gap, rate, 1.0 / rhythm.w)
     beyond = pair_difference(whole, pair_within(whole, (-dead, -dead), (dead, dead)))
     error = pair_within(beyond, (-far, -far), (far, far))
@@ -201,8 +210,8 @@ def cycle(
     w, dt = rhythm.w, rhythm.dt
     starting, stepping = memory.mode < 0.5, (memory.mode > 0.5) & (memory.mode < 1.5)
     swings = stepping & (memory.tau > rhythm.both)
-    seen = _measured(walker.body, rhythm, memory, senses, swings)
-    seen = _Seen(seen.com, seen.attitude, seen.valid * feedback)
+    seen = _measured(walker.body, rhythm, memory, senses, swings, starting | (memory.tau <= rhythm.both))
+    seen = replace(seen, valid=seen.valid * feedback)
     gap, gap_rate, error, slope, lean, lasting = _estimated(rhythm, gains, memory, seen)
     pulls = where(starting, 0.0, seen.valid) * w
     rate = tuple(v + pulls * k * e for v, k, e in zip(memory.rate, gains.pull, error, strict=True))
@@ -227,10 +236,12 @@ def cycle(
     com, rate = pendulum(memory.com, _pair(rate), zmp, w, dt)
     share = where(stepping & ~now.lands, now.share, 0.0)
     swing = _swing(rhythm, gains, now, share, _pair(lean), feedback)
-    waist, joints = _whole(walker.body, ahead.height, now, swing, com, memory.waist, q)
+    center = pair_sum(com, _pair(lasting), -gains.trim * feedback)
+    waist, joints = _whole(walker.body, ahead.height, now, swing, center, memory.waist, q)
     after = Memory(
         now.mode, now.tau + dt, now.period, now.side, now.stance, now.other, com, rate, zmp, decided.held,
-        now.place, seen.valid, gap, gap_rate, error, slope, lean, lasting, waist,
+        now.place, where(seen.valid > 0.5, seen.side, memory.seen), gap, gap_rate, error, slope, lean,
+        lasting, waist,
     )  # fmt: skip
     return after, joints, where(now.lands, 1.0, 0.0)
 

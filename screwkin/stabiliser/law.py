@@ -148,7 +148,7 @@ class Gains:
     pull: share of the DCM's error beyond dead that the pendulum takes over in a cycle, ahead and aside;
     rate_filter: of the error's rate, share of the newest; lean: share of the trunk's lean by which the
     swing foot turns; lean_filter: share of the newest; level_time: time constant of what lasts, the floor's
-    slope and the CoM's gap [s]; sole: share of the sole,
+    slope and the CoM's gap [s]; trim: share of that gap which the waist takes back; sole: share of the sole,
     less margin, in which the ZMP may go; step: share of what is left that the foot's place takes, up to reach
     ahead and aside; timing: share of it that the step's time takes, within sooner to later of the planned
     time, by at most two cycles a cycle; largest: error of the DCM beyond which it counts no more.
@@ -169,6 +169,7 @@ class Gains:
     sooner: Scalar = 0.7
     later: Scalar = 1.4
     largest: Scalar = 0.37
+    trim: Scalar = 0.5
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import screwkin as sk
-from screwkin.algebra.se3 import Pose, Rotation, Vector, X, as_array, pose_from_array, rotate
+from screwkin.algebra.se3 import Pose, Rotation, Vector, X, Y, as_array, pose_from_array, rotate
 from screwkin.compiler.run import run
 from screwkin.errors import InputError
 from screwkin.model.robot import Robot
@@ -244,6 +244,37 @@ def test_a_robot_that_does_what_it_is_told_is_left_alone(walk: StabilisedWalk, c
         assert np.abs(course.q - other.q).max() < 0.05
     assert course.landed == len(walk.steps)
     np.testing.assert_allclose(memory(course).stance, memory(other).stance, atol=5e-3)
+
+
+@pytest.mark.parametrize("late", range(7))
+def test_servos_that_are_late_are_no_push(robot: Robot, late: int) -> None:
+    """All joints up to 60 ms behind: the other foot still swings as it should stand, and is no measure yet.
+
+    Between what is felt and commanded lies the way of the CoM in that time, and no more.
+    """
+    walk = stabilised(robot, planned(robot, Tc=0.35, stride=0.1))
+    course, done, off = walk.start, [walk.start.q], []
+    for _ in walk.heights:
+        course = walk.advanced(course, level(done[max(0, len(done) - 1 - late)]))
+        done.append(course.q)
+        off.append(memory(course).error)
+    assert course.landed == len(walk.steps)
+    way = late * CYCLE * walk.rhythm.w * 0.05  # the DCM runs at w times its distance from the ZMP
+    assert np.abs(off).max() < max(0.0, way - walk.gains.dead * walk.rhythm.half[1]) + 1e-9
+
+
+@pytest.mark.parametrize("lean", [-0.05, 0.03])
+def test_half_of_what_lasts_is_taken_back_by_the_waist(walk: StabilisedWalk, lean: float) -> None:
+    """On a slope the CoM stands beside where it is planned; the waist goes against it."""
+    waists = []
+    for angle in (0.0, lean):
+        course = walk.start
+        for _ in range(round(float(walk.rhythm.beginning) / CYCLE) - 2):
+            course = walk.advanced(course, replace(level(course.q), attitude=as_array(rotate(Y, angle))))
+        waists.append(memory(course).waist[0] * walk.body.share)
+    expected = -walk.gains.trim * memory(course).lasting[0]
+    assert math.isclose(waists[1] - waists[0], expected, abs_tol=2e-4)
+    assert abs(expected) > 0.2 * abs(lean) * walk.rhythm.com_height
 
 
 def test_a_push_aside_lets_the_foot_land_where_the_robot_falls(walk: StabilisedWalk, courses: States) -> None:
