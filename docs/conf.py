@@ -14,8 +14,12 @@ os.environ |= {"TTY_INTERACTIVE": "0", "COLUMNS": "96"}  # shell cells: no bars,
 os.environ["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])  # of shell cells
 
 import references
+from docutils import nodes
+from sphinx.util.logging import getLogger
 
 from screwkin import __version__
+
+LOG = getLogger(__name__)
 
 project = "screwkin"
 author = "screwkin contributors"
@@ -65,9 +69,17 @@ def links_out_of_the_site(app, name, source) -> None:
         source[0] = re.sub(r"\[([^\]]*)\]\(\.\./([\w/.-]+)\)", r"\1 (`\2`)", source[0])
 
 
+def pictures_have_words(app, doctree) -> None:
+    """A picture without alternative text is a warning; cells give theirs by ``mystnb: image: alt``."""
+    for picture in doctree.findall(nodes.image):
+        if not picture.get("alt", "").strip():
+            LOG.warning("picture without alternative text: %s", picture["uri"], location=picture)
+
+
 def setup(app) -> None:
     """Write the pages of reference from the code before Sphinx reads the folder."""
     references.write_all(HERE / "reference")
     app.connect("source-read", links_out_of_the_site)
+    app.connect("doctree-read", pictures_have_words)
     app.connect("autodoc-process-docstring", whole_sentences, priority=400)  # before napoleon reads it
     app.connect("autodoc-process-docstring", absolute_values)

@@ -30,6 +30,21 @@ def test_links_between_pages_and_pictures_lead_somewhere(page: str) -> None:
     assert not missing
 
 
+def test_every_result_page_is_linked_from_a_page_that_speaks_of_it() -> None:
+    pages = [path for path in (ROOT / "docs").rglob("*.md") if path.parent.name != "reference"]
+    text = "".join(path.read_text(encoding="utf-8") for path in pages)
+    results = {path.name for path in (ROOT / "benchmarks/results").glob("*.md")}
+    assert results == set(re.findall(r"\]\([./]*benchmarks/results/([\w-]+\.md)\)", text))
+
+
+@pytest.mark.parametrize("page", [*(ROOT / "docs").rglob("*.md"), ROOT / "README.md"], ids=lambda p: p.stem)
+def test_pictures_have_alternative_texts_of_several_words(page: Path) -> None:
+    """Of pages; ``docs/conf.py`` looks at those that cells draw while it builds the site."""
+    text = page.read_text(encoding="utf-8")
+    assert all(len(alt.split()) > 3 for alt in re.findall(r"!\[(.*?)\]\(", text, re.DOTALL))
+    assert all(re.search(r'\balt="[^"]+"', tag) for tag in re.findall(r"<img\b[^>]*>", text))
+
+
 @pytest.mark.parametrize(
     ("figure", "page", "there"),
     [
