@@ -38,13 +38,14 @@ from screwkin.cli.options import AsJson, FittingGait, GaitName, OutputFolder, Ro
 from screwkin.cli.output import aligned, drawn, print_json, progress_bar, remark, say
 from screwkin.cli.simulation import engine as engine_named
 from screwkin.cli.sweep_optimise import bounds_of, optimise
-from screwkin.cli.walk import limbed, stepping_gait
+from screwkin.cli.walk import TO_FIT, advice_to_fit, limbed, stepping_gait
 from screwkin.errors import GaitError, InputError, near, one_of
 from screwkin.files import atomic_write, atomic_write_bytes, npz_bytes, versions
 from screwkin.gait.files import default_gait, load_gait
 from screwkin.gait.fitting import fitting_gait
 from screwkin.gait.listed import Footsteps, load_footsteps, with_footsteps
 from screwkin.gait.record import Gait
+from screwkin.gait.stance import stance_of
 from screwkin.model.robot import Robot, robot_text
 from screwkin.model.table import load_robot
 
@@ -139,6 +140,9 @@ def sweep(
             "perturb": " ".join(perturb) if perturb else AS_PLANNED,
         },
     )
+    chosen = bool(auto or gait or list_of_steps or _sets(fixed, "gait"))
+    with advice_to_fit(default=not chosen):
+        stance_of(table)
     places = None if list_of_steps is None else load_footsteps(list_of_steps)
     campaign = _campaign(table, axes, _seeds(seeds, seed or 0, 1 if runs is None else runs), places)
     if jobs is not None and jobs < 1:
@@ -161,7 +165,7 @@ def sweep(
     else:
         _print(campaign, total, each, pairs)
         say(f"files in {folder}: {', '.join(sorted(p.name for p in folder.iterdir() if p.is_file()))}")
-    for line in _crashes(done):
+    for line in _failures(done, "" if chosen else TO_FIT):
         remark(line)
     return 1 if total.crashed else 0
 
@@ -318,10 +322,14 @@ def _cells(t: Tally) -> tuple[str, ...]:
     return str(t.rows), str(t.stood), str(t.fell), interval, *counts, margin
 
 
-def _crashes(done: Mapping[int, Outcome]) -> list[str]:
-    """A line for each reason of a crash, with the first row of it."""
+def _failures(done: Mapping[int, Outcome], advice: str) -> list[str]:
+    """A line for each reason of a crash, with its first row, and one for the first row that is refused."""
     first: dict[str, int] = {}
     for index in sorted(done):
         if done[index].status == "crashed":
             first.setdefault(done[index].reason, index)
-    return [f"crashed, row {index}: {reason}" for reason, index in first.items()]
+    refused = [index for index in sorted(done) if done[index].status == "refused"][:1]
+    return [
+        *(f"crashed, row {index}: {reason}" for reason, index in first.items()),
+        *(f"refused, row {index}: {done[index].reason}{advice}" for index in refused),
+    ]

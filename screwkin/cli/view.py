@@ -10,7 +10,7 @@ import typer
 
 from screwkin.cli.options import AsJson, FittingGait
 from screwkin.cli.output import print_json, progress_bar, say
-from screwkin.cli.walk import limbed
+from screwkin.cli.walk import advice_to_fit, limbed
 from screwkin.errors import InputError
 from screwkin.gait.files import default_gait, load_gait
 from screwkin.gait.fitting import fitting_gait
@@ -56,7 +56,9 @@ def view(
         check_film(film)
     session = _session(what, gait, auto, steps)
     if film is not None:
-        return _filmed(session, what, film, as_json)
+        unchosen = gait is None and not auto and session.track is None
+        with advice_to_fit(default=unchosen and session.robot.base == "floating"):
+            return _filmed(session, what, film, as_json)
 
     def ready(url: str) -> None:
         if as_json:

@@ -32,6 +32,9 @@ from screwkin.model.table import load_robot
 from screwkin.report.names import PAGE, remove_reports
 from screwkin.report.numbers import walk_data, walk_numbers
 
+TO_FIT = "; or fit a gait to the robot: --auto"
+"""What ends the refusal of a walk whose gait nobody chose."""
+
 
 def walk(
     robot: RobotName,
@@ -103,7 +106,7 @@ def walk(
     steps = 0 if places else chosen.steps if steps is None else steps
     command = command_of(robot, None if auto else name, steps, assignments, rate, where)
     with output_folder(output, "walk", table.name) as folder:
-        with _advice_to_fit(default=not (auto or gait or where)):
+        with advice_to_fit(default=not (auto or gait or where)):
             account, remedied = _planned(table, chosen, steps, command, _places(places or [])), None
         if wanted is not None:
             command = shlex.join([*shlex.split(command), *wanted.words])
@@ -127,13 +130,13 @@ def walk(
 
 
 @contextmanager
-def _advice_to_fit(default: bool) -> Iterator[None]:
+def advice_to_fit(default: bool) -> Iterator[None]:
     """Where nobody chose the gait, and the robot cannot walk it: one may be fitted to the robot."""
     try:
         yield
     except (NoSolutionError, InputError) as error:
         if default:
-            error.args = (f"{error}; or fit a gait to the robot: --auto", *error.args[1:])
+            error.args = (f"{error}{TO_FIT}", *error.args[1:])
         raise
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import screwkin as sk
+from tests.bodies import humanoid
 
 GRID = ("sweep", "bioloid", "--gait", "walk", "--engine", "kinematic", "--set", "steps=1", "--set", "rate=20")
 
@@ -38,6 +39,26 @@ def test_a_campaign_leaves_its_rows_and_what_has_ended_is_not_played_again(cli, 
     assert "6 of 6 rows have ended before; 0 are left" in again.err
     assert "equal seeds" not in again.out  # of rows that are only planned nobody knows if they stand
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
+
+
+@pytest.mark.parametrize("chosen", [False, True])
+def test_what_refuses_a_robot_of_ones_own_is_said_and_that_a_gait_may_be_fitted_if_nobody_chose_one(
+    cli, tmp_path, chosen
+):
+    (tmp_path / "body.toml").write_text(humanoid(), encoding="utf-8")
+    words = ["body.toml", "--set", "rate=20", "--set", "steps=1,2", *(["--gait", "walk"] if chosen else [])]
+    swept = cli("sweep", *words, "--engine", "kinematic", "--no-plots", "-o", "c", "--json")
+    assert (swept.code, swept.data["refused"]) == (0, 2)
+    (line,) = [line for line in swept.err.splitlines() if line.startswith("refused, row 0: ")]
+    with (tmp_path / "c" / "rows.csv").open(newline="") as file:
+        assert next(csv.DictReader(file))["reason"] in line
+    assert line.endswith("or fit a gait to the robot: --auto") != chosen
+
+
+def test_a_robot_that_no_gait_moves_is_refused_before_anything_is_played(cli, tmp_path, refused):
+    (tmp_path / "body.toml").write_text(humanoid().partition("[[posture]]")[0], encoding="utf-8")
+    assert "no posture 'home'" in refused(cli("sweep", "body.toml", "-o", "c"), 2)
+    assert not (tmp_path / "c").exists()
 
 
 PLACES = [(0.03, -0.04, 0.0), (0.05, 0.04, 0.1), (0.05, -0.04, 0.1)]

@@ -5,6 +5,7 @@ import pytest
 import screwkin as sk
 import screwkin.cli.view as verb
 from screwkin.gait.fitting import fitting_gait
+from tests.bodies import humanoid
 
 
 @pytest.fixture
@@ -48,6 +49,15 @@ def test_what_cannot_be_shown_is_refused(cli, refused, shown, walked, tmp_path):
     assert "unknown robot" in refused(cli("view", "bioloidd"), 2)
     assert shown == []
     assert list(tmp_path.iterdir()) == []
+
+
+def test_who_films_a_walk_that_is_none_is_told_of_one_that_fits(cli, refused, tmp_path):
+    (tmp_path / "body.toml").write_text(humanoid(), encoding="utf-8")
+    words = ("view", "body.toml", "--record", "a.gif")
+    advice = "or fit a gait to the robot: --auto"
+    assert refused(cli(*words), 2).rstrip().endswith(advice)
+    assert advice not in refused(cli(*words, "--gait", "walk"), 2)
+    assert advice not in refused(cli("view", "linkages/four-bar", "--record", "a.gif"), 2)
 
 
 def test_an_interrupt_ends_it_with_130(cli, monkeypatch):
