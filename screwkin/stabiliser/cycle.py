@@ -18,21 +18,23 @@ from screwkin.stabiliser.body import WalkingBody
 from screwkin.stabiliser.law import (
     Gains,
     Landing,
-    Pair,
     Rhythm,
-    clipped,
-    either,
     first_shift,
     nominal_place,
-    pair_difference,
-    pair_sum,
-    pair_turned,
-    pair_within,
     pendulum,
     progress,
     raised,
     step_landing,
     stopping_zmp,
+)
+from screwkin.stabiliser.pairs import (
+    Pair,
+    clipped,
+    either,
+    pair_difference,
+    pair_sum,
+    pair_turned,
+    pair_within,
 )
 
 Place = tuple[Scalar, Scalar, Scalar]

@@ -31,8 +31,9 @@ from screwkin.stabiliser.cycle import (
     StabilisedBody,
     cycle,
 )
-from screwkin.stabiliser.law import Gains, Rhythm, of_row, row, scalars_in
+from screwkin.stabiliser.law import Gains, Rhythm
 from screwkin.stabiliser.odometry import Whereabouts, back_to_plan
+from screwkin.stabiliser.pairs import of_row, row, scalars_in
 from screwkin.stabiliser.rhythm import CYCLE, footholds_of, rhythm_of, share_of, start_of, steps_of, swings_of
 from screwkin.trajectory import Trajectory
 

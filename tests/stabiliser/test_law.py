@@ -11,18 +11,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from screwkin.stabiliser import law as law
+from screwkin.stabiliser import pairs as pairs
 from screwkin.stabiliser.law import Gains, Rhythm
 from screwkin.stabiliser.rhythm import CYCLE
 
 
 @given(st.floats(-16.0, 16.0))
 def test_the_exponential_is_that_of_the_library(x: float) -> None:
-    assert law.exponential(x) == pytest.approx(math.exp(x), rel=1e-12)
+    assert pairs.exponential(x) == pytest.approx(math.exp(x), rel=1e-12)
 
 
 @given(st.floats(0.5, 2.0))
 def test_the_logarithm_is_that_of_the_library(x: float) -> None:
-    assert law.logarithm(x) == pytest.approx(math.log(x), rel=1e-12, abs=1e-15)
+    assert pairs.logarithm(x) == pytest.approx(math.log(x), rel=1e-12, abs=1e-15)
 
 
 @given(z=st.floats(0.01, 3.0), x=st.floats(-0.1, 0.1), far=st.floats(-0.1, 0.1))
@@ -207,6 +208,6 @@ class _Course:
 
 def test_records_survive_their_rows() -> None:
     gains = Gains(pull=(0.1, 0.2), reach=(0.3, 0.4))
-    assert law.of_row(Gains, law.row(gains)) == gains
-    assert len(law.row(gains)) == law.scalars_in(Gains)
-    assert law.of_row(Rhythm, law.row(RHYTHM)) == RHYTHM
+    assert pairs.of_row(Gains, pairs.row(gains)) == gains
+    assert len(pairs.row(gains)) == pairs.scalars_in(Gains)
+    assert pairs.of_row(Rhythm, pairs.row(RHYTHM)) == RHYTHM

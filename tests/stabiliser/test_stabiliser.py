@@ -17,7 +17,7 @@ from screwkin.compiler.run import run
 from screwkin.errors import InputError
 from screwkin.model.robot import Robot
 from screwkin.sim.feedback import WalkController
-from screwkin.stabiliser import law as law
+from screwkin.stabiliser import pairs as pairs
 from screwkin.stabiliser.cycle import STARTING, STEPPING, STOPPING, Memory
 from screwkin.stabiliser.rhythm import CYCLE
 from screwkin.stabiliser.walk import (
@@ -72,7 +72,7 @@ def courses(walk: StabilisedWalk) -> list[StabilisedState]:
 
 
 def memory(course: StabilisedState) -> Memory:
-    return law.of_row(Memory, course.memory.tolist())
+    return pairs.of_row(Memory, course.memory.tolist())
 
 
 def test_the_plan_s_own_rhythm_and_steps_are_read_off_it(walk: StabilisedWalk) -> None:
@@ -204,7 +204,7 @@ def test_it_measures_the_com_whatever_the_imu_s_heading(
     inputs = cycle_in_a_step(robot)
     rng = np.random.default_rng(seed)
     q = np.array(sk.home(robot).q) + rng.uniform(-0.1, 0.1, 18)
-    now = law.of_row(Memory, inputs["memory"].tolist())
+    now = pairs.of_row(Memory, inputs["memory"].tolist())
     cx, sx, cy, sy = math.cos(lean[0]), math.sin(lean[0]), math.cos(lean[1]), math.sin(lean[1])
     R = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]]) @ np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
     base = np.eye(4)
@@ -221,7 +221,7 @@ def test_it_measures_the_com_whatever_the_imu_s_heading(
         "force": np.array([0.0, 20.0]),
         "pressure": np.zeros((2, 2)),
     }
-    after = law.of_row(Memory, run(stabiliser_of(robot), inputs, ())["memory_after"].tolist())
+    after = pairs.of_row(Memory, run(stabiliser_of(robot), inputs, ())["memory_after"].tolist())
     np.testing.assert_allclose(np.add(after.gap, after.lasting) + now.com, expected, atol=1e-9)
 
 
