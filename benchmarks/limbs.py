@@ -6,7 +6,8 @@ solutions hold the positions themselves, to 1e-10 rad; inside: the share with a 
 robot that does not stand on two legs has its longest chain measured, of at most seven joints. An arm of more
 than seven joints, as one that begins at the waist has, is also measured from its shoulder on: its last seven.
 
-Time: processor time of one thread for a pose, of so many batches: least, median and most.
+Time: processor time of one thread for a pose, of so many batches: least, median and most. The first one is
+solved before, too, so that all programs are there.
 """
 
 from __future__ import annotations
@@ -124,7 +125,8 @@ def row_of(file: str, name: str, chain: SerialChain, rest: Array, poses: int | N
     for program in limb_programs(chain):
         compile_program(program)
     own, inside = np.zeros((2, count), dtype=bool)
-    for part in np.array_split(np.arange(count), min(count, BATCHES)):
+    parts = np.array_split(np.arange(count), min(count, BATCHES))
+    for part in [parts[0], *parts]:
         start = time.process_time()
         found = solve_limb(chain, T[part], "auto", guess[part], DEFAULT, part.shape)
         times.append(1e6 * (time.process_time() - start) / len(part))
@@ -132,7 +134,7 @@ def row_of(file: str, name: str, chain: SerialChain, rest: Array, poses: int | N
         own[part] = ((apart < OWN) & found.valid).any(axis=1)
         inside[part] = found.in_limits.any(axis=1)
     share = float(own.mean()) if branches > 1 else None
-    return Row(file, name, n, family, count, share, float(inside.mean()), tuple(times))
+    return Row(file, name, n, family, count, share, float(inside.mean()), tuple(times[1:]))
 
 
 def rows_of(path: Path, poses: int | None = None) -> Iterator[Row]:
