@@ -165,7 +165,7 @@ def chain_of(screws: list[Screw], name: str) -> SerialChain:
 def robot_files() -> list[Path]:
     """URDF files of example-robot-data, or of the folder ``SCREWKIN_ROBOTS``."""
     share = Path(sysconfig.get_path("purelib"), "cmeel.prefix", "share", "example-robot-data", "robots")
-    return sorted(Path(os.environ.get("SCREWKIN_ROBOTS", share)).glob("*/*/*.urdf"))
+    return sorted(Path(os.environ.get("SCREWKIN_ROBOTS", share)).rglob("*.urdf"))
 
 
 def different(chains: Collection[SerialChain]) -> list[SerialChain]:
