@@ -17,7 +17,6 @@ from screwkin.compiler.run import run
 from screwkin.ik.closed import (
     EXACT,
     SAME,
-    STILL,
     clearness,
     completed,
     conditioned,
@@ -34,6 +33,8 @@ from screwkin.ik.ways import elimination, exact
 from screwkin.kinematics.serial_chain import SerialChain, per_chain
 from screwkin.model.records import LIMIT_TOLERANCE
 
+OTHERS = 2
+"""Other axes of further joints that are tried where those of the first choice lead to no solution."""
 FOLDED = 100.0
 """Slack of a relative's branches, over its departure from the limb, below which the limb's own may fall
 together elsewhere."""
@@ -55,21 +56,30 @@ def by_relative(chain: SerialChain) -> bool:
     return not exact(whole) and relative(whole) is not None
 
 
-@per_chain
 def of_six(chain: SerialChain) -> SerialChain:
-    """The limb, one of four or five joints with further ones that turn its tip.
+    """The limb, one of four or five joints with further ones that turn its tip."""
+    return _wholes(chain)[0]
 
-    Of their axes those are taken about which branches of the relative are furthest apart, or else, about the
-    tip's own, the six joints best conditioned.
+
+@per_chain
+def _wholes(chain: SerialChain) -> tuple[SerialChain, ...]:
+    """The limb ``of_six``, and others for poses in which that is singular.
+
+    Of the axes of further joints those come first about which branches of the relative are furthest apart,
+    then others, or where there is no relative one, by how well the six joints are conditioned.
     """
     missing = 6 - len(chain.screws)
     if missing not in (1, 2) or not chain.turning.all():
-        return chain
+        return (chain,)
     near = [(form, whole) for whole in completed(chain) if (form := relative(whole)) is not None]
     if near:
-        return max(near, key=lambda pair: clearness(pair[0], 6 - missing))[1]
+        clearest = max(near, key=lambda pair: clearness(pair[0], 6 - missing))[1]
+        others = [whole for _, whole in near if whole is not clearest]
+        return clearest, *sorted(others, key=conditioned, reverse=True)[:OTHERS]
     freed = [chain.freed(free, range(missing)) for free in combinations(("rx", "ry", "rz"), missing)]
-    return max((whole for whole in freed if elimination(whole) is not None), key=conditioned, default=chain)
+    return (
+        max((whole for whole in freed if elimination(whole) is not None), key=conditioned, default=chain),
+    )
 
 
 def branch_solutions(
@@ -110,22 +120,30 @@ def _with_held_tip(
     chain: SerialChain, target: Array, guess: Array, tolerances: tuple[float, float], batch: tuple[int, ...]
 ) -> LimbSolutions:
     """The solutions of four or five joints: those of six where the last, which turn the tip, rest."""
+    first, *others = _wholes(chain)
+    q, error = _held(chain, first, target, guess)
+    for whole in others:
+        lost = np.flatnonzero(~(error <= EXACT).any(axis=1))
+        if len(lost):
+            q[lost], error[lost] = _held(chain, whole, target[lost], guess[lost])
+    if max(tolerances) > LIMIT_TOLERANCE:
+        owner, k = np.nonzero(error <= EXACT)
+        q[owner, k] = on_limits(chain, q[owner, k], target[owner], tolerances)
+    valid = first_of_its_kind(q, error)
+    return _certified(chain, q, error, valid, guess, batch)
+
+
+def _held(chain: SerialChain, whole: SerialChain, target: Array, guess: Array) -> tuple[Array, Array]:
+    """What Newton steps of the limb make of the branches (B, k, n) of six joints, and its error (B, k)."""
     own, count = len(chain.screws), len(target)
     start = np.concatenate([guess, np.zeros((count, 6 - own))], axis=1)
-    found = branch_solutions(of_six(chain), target, start, (0.0, 0.0), (count,))
-    turned = (1 - np.cos(found.q[..., own:])).sum(axis=2)
-    still = found.valid & (turned <= STILL)
-    owner, k = (still | ~still.any(axis=1, keepdims=True)).nonzero()
-    q, error = np.nan_to_num(found.q[..., :own]), np.full(still.shape, np.inf)
+    found = branch_solutions(whole, target, start, (0.0, 0.0), (count,)).q
+    owner, k = np.nonzero(np.isfinite(found).all(axis=2))
+    q, error = np.nan_to_num(found[..., :own]), np.full(found.shape[:2], np.inf)
     out = run(steps(chain), {"start": q[owner, k], "target": target[owner]})
     q[owner, k], error[owner, k] = out["q"], out["error"][:, 0]
     iterated(chain, q, error, target)
-    near, solves = chain.wrapped(q[owner, k]), np.flatnonzero(error[owner, k] <= EXACT)
-    if max(tolerances) > LIMIT_TOLERANCE:
-        near[solves] = on_limits(chain, near[solves], target[owner[solves]], tolerances)
-    q[owner, k] = near
-    valid = first_of_its_kind(q, error)
-    return _certified(chain, q, error, valid, guess, batch)
+    return chain.wrapped(q), error
 
 
 def _certified(

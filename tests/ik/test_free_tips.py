@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 import screwkin as sk
 from screwkin.algebra.se3 import as_array, unstack
 from screwkin.errors import InputError, UnknownNameError
+from screwkin.ik.all_branches import branch_solutions
 from screwkin.ik.closed import closed_form
 from screwkin.ik.implicit import limb_in_jax
 from screwkin.ik.methods import solve_limb
@@ -114,7 +115,7 @@ def assert_own_poses_are_solved(chain: SerialChain, seed: int, free: tuple[str, 
     assert solved.method == "branches"
     sizes = np.linalg.svd(residual(longer, np.c_[q, start[:, 5:]], T)[1], compute_uv=False)
     regular = sizes[:, -1] > REGULAR * sizes[:, 0]
-    assert regular.mean() > 0.98
+    assert regular.mean() > 0.95
     assert solved.in_limits.any(axis=1)[regular].all()
     assert solved.residual[solved.valid].max() < 1e-9
     assert np.nanmin(apart(solved.q[..., :5], q[:, None]), axis=1)[regular].max() < 1e-5
@@ -145,6 +146,20 @@ def test_a_program_alone_solves_legs_that_lie_in_one_plane(seed: int) -> None:
     assert (certified[:, 0] > 0.5).mean() > 0.9
     own = ((apart(found, q[:, None]) < 1e-9) & (kind > 0.5)).any(axis=1)
     assert own[certified[:, 0] > 0.5].all()
+
+
+def test_rounded_legs_are_solved_where_their_yaw_turns_four_axes_parallel() -> None:
+    """The nearest closed form is singular there, of six joints and the limb's own, about any one axis."""
+    rng, solved = np.random.default_rng(3), []
+    for seed in range(3):
+        chain = rounded_leg(seed, 4e-6)
+        q = rng.uniform(-1.2, 1.2, (200, 5))
+        q[:, 1] = np.pi / 2 + 10 ** rng.uniform(-5, -2, 200)
+        T = as_array(forward(chain.screws, unstack(q), chain.tip)[0], (200,))
+        found = branch_solutions(chain, T, np.zeros((200, 5)), (0.0, 0.0), (200,))
+        assert found.residual[found.valid].max() < 1e-12
+        solved.append(found.valid.any(axis=1).mean())
+    assert np.mean(solved) > 0.93, solved
 
 
 def test_no_poses_have_no_solutions_and_jax_arrays_follow() -> None:
