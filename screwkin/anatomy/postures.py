@@ -21,8 +21,9 @@ from screwkin.kinematics.body import center_of_mass
 from screwkin.kinematics.serial_chain import SerialChain, residual
 from screwkin.model.robot import Joint, Posture, Robot
 
-BEND = 0.94
-"""Distance of hip and ankle by the greatest one: knees of two equal bones are bent by 40 degrees."""
+BEND = (0.94, 0.96, 0.98, 0.99)
+"""Distance of hip and ankle by the greatest one: knees of two equal bones are bent by 40 degrees; by less
+where limits do not let them."""
 ROOM = 0.02
 """Share of a joint's range that home keeps from its limits."""
 HEIGHTS = np.linspace(1.3, 0.4, 37)
@@ -110,7 +111,10 @@ def home_of(legs: Legs, rest: Array) -> Home:
             f"{robot.name}: within their limits, the legs cannot stand with level soles at any height"
         )
     height, q, rows = heights[found.place], found.q, found.rows
-    bent = legs.ankle + BEND * (height - legs.ankle)
+    lower = [legs.ankle + share * (height - legs.ankle) for share in BEND]
+    stood = (float(start.x), float(start.y))
+    below = (h for h in lower if side.solved(np.array([[*stood, legs.hip - h]]), rows, side.starts))
+    bent = next(below, lower[0])
     place, off = np.array([float(start.x), float(start.y), legs.hip - bent]), np.inf
     starts = side.starts
     for _ in range(ROUNDS):

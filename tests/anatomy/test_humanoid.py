@@ -1,5 +1,6 @@
 """Limbs, soles, forward, up and home of bodies whose parts have no names worth the name."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -180,3 +181,24 @@ def test_a_body_whose_arms_point_up_stands_on_its_legs(seed):
 def test_the_sole_lies_where_the_plate_is():
     robot = found().robot
     assert as_array(robot.limb("left_leg").frame)[2, 3] == pytest.approx(SOLE)
+
+
+@pytest.mark.parametrize("most", [0.2, 0.4, 0.6])
+def test_a_home_is_bent_as_far_as_limits_of_the_hips_let_it(most):
+    """Thighs that swing forward by little: no straight leg, on which no gait could begin."""
+    parsed = parse_urdf(biped().text()).robot
+    names = anatomy(parsed).robot
+    hips = {names.joints[names.path_to(limb.link)[2]].name for limb in names.limbs if limb.kind == "leg"}
+    limited = tuple(
+        replace(joint, lower=-most, upper=most) if joint.name in hips else joint for joint in parsed.joints
+    )
+    robot = anatomy(replace(parsed, joints=limited)).robot
+    q = np.array(robot.posture("home").q, dtype=float)
+    low, high = limits_of(robot)
+    assert within(q, low, high).all()
+    knees = [robot.path_to(limb.link)[3] for limb in robot.limbs if limb.kind == "leg"]
+    assert (np.abs(q[knees]) > 0.25).all()
+    for foot in ("left_foot", "right_foot"):
+        pose = frame_pose(robot, home(robot), foot)
+        np.testing.assert_allclose(pose[2, :3], [0, 0, 1], atol=1e-8)
+        assert abs(pose[2, 3] - frame_pose(robot, home(robot), "left_foot")[2, 3]) < 1e-8
