@@ -107,8 +107,12 @@ def home_of(legs: Legs, rest: Array) -> Home:
     fitting = [rows for rows in parts if len(rows) <= len(side.own)] or parts[-1:]
     found = next((one for rows in fitting if (one := side.solved(places, rows, side.starts))), None)
     if found is None:
+        few, needed = int((side.high > side.low).sum()), len(fitting[-1])
         raise NoSolutionError(
-            f"{robot.name}: within their limits, the legs cannot stand with level soles at any height"
+            f"{robot.name}: legs of {few} joints cannot keep soles level wherever they step; that takes"
+            f" at least {needed}: two for the sole's tilts, one for its height and one ahead"
+            if few < needed
+            else f"{robot.name}: within their limits, the legs cannot stand with level soles at any height"
         )
     height, q, rows = heights[found.place], found.q, found.rows
     lower = [legs.ankle + share * (height - legs.ankle) for share in BEND]

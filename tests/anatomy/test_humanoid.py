@@ -11,6 +11,7 @@ from screwkin.algebra.se3 import as_array
 from screwkin.anatomy.humanoid import anatomy
 from screwkin.anatomy.limbs import AnatomyError
 from screwkin.dynamics.support import sole_corners
+from screwkin.errors import NoSolutionError
 from screwkin.kinematics.body import center_of_mass, frame_pose
 from screwkin.kinematics.limits import limits_of, within
 from screwkin.model.state import home
@@ -202,3 +203,8 @@ def test_a_home_is_bent_as_far_as_limits_of_the_hips_let_it(most):
         pose = frame_pose(robot, home(robot), foot)
         np.testing.assert_allclose(pose[2, :3], [0, 0, 1], atol=1e-8)
         assert abs(pose[2, 3] - frame_pose(robot, home(robot), "left_foot")[2, 3]) < 1e-8
+
+
+def test_legs_with_fewer_joints_than_a_step_has_freedoms_are_refused_by_their_number():
+    with pytest.raises(NoSolutionError, match=r"legs of 3 joints .* at least 4"):
+        anatomy(parse_urdf(biped(leg=("hip_pitch", "hip_roll", "knee_pitch"), tilt=0.2).text()).robot)
