@@ -125,6 +125,25 @@ def test_the_verb_prints_remarks_and_leaves_with_3_for_an_error(tmp_path, capsys
     assert "error: masses: no link has a mass" in capsys.readouterr().out
 
 
+def test_what_is_printed_repeats_nothing_and_leaves_nothing_out(tmp_path, capsys):
+    """A URDF without limbs, whose joints have no speed: many alike, those on limbs with one advice."""
+    path = tmp_path / "robot.urdf"
+    assert run(["convert", "poppy12", str(path)]) == 0
+    path.with_suffix(".srdf").unlink()
+    capsys.readouterr()
+    assert run(["check", str(path), "--json"]) == 0
+    remarks = json.loads(capsys.readouterr().out)["remarks"]
+    assert run(["check", str(path)]) == 0
+    *lines, count = capsys.readouterr().out.splitlines()
+    text = " ".join(" ".join(lines).split())
+    assert count.endswith(f"0 errors, 0 warnings, {len(remarks)} remarks")
+    assert ".." not in text
+    for remark in remarks:
+        assert remark["place"] in text
+        assert text.count(remark["what"]) == 1
+        assert text.count(remark["advice"]) == 1
+
+
 def test_servos_that_no_bus_can_play_to_are_warnings_and_missing_files_are_errors(robot):
     def on(**servos):
         return replace(robot, servos={**robot.servos, **servos})
