@@ -133,10 +133,13 @@ def limb_colours(account: Account) -> dict[str, str]:
 
 
 def joint_colours(account: Account, others: str = PLAIN) -> dict[str, str]:
-    """Colour of every joint: its limb's."""
+    """Colour of every joint: its limb's, or that of others if it carries limbs of both sides."""
     robot, of_limb = account.robot, limb_colours(account)
-    own = {robot.tree[i].name: of_limb[limb.name] for limb in robot.limbs for i in robot.path_to(limb.link)}
-    return {**dict.fromkeys(robot.joint_names, others), **own}
+    own: dict[str, set[str]] = {name: set() for name in robot.joint_names}
+    for limb in robot.limbs:
+        for i in robot.path_to(limb.link):
+            own[robot.tree[i].name].add(of_limb[limb.name])
+    return {name: colours.pop() if len(colours) == 1 else others for name, colours in own.items()}
 
 
 def shade_swings(axes: Axes, account: Account) -> None:

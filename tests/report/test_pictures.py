@@ -1,15 +1,19 @@
 """Pictures: every one is drawn and holds what it says; nothing global is left behind."""
 
+from dataclasses import replace
+
 import matplotlib as mpl
 import numpy as np
 import pytest
 from PIL import Image
 
+import screwkin as sk
 from screwkin.algebra.se3 import as_array
 from screwkin.errors import InputError
 from screwkin.report import balance, frames, motion, simulation
 from screwkin.report.pictures import save_pictures
-from screwkin.report.style import new_figure, save_figure, spans, styled, titled
+from screwkin.report.style import joint_colours, new_figure, save_figure, spans, styled, titled
+from tests.bodies import humanoid
 
 
 @pytest.fixture(scope="module")
@@ -33,6 +37,16 @@ def test_every_picture_is_a_png_with_something_in_it(saved):
             grey = np.asarray(image.convert("L"))
         assert 0.01 < (grey < 250).mean() < 0.9, picture.path.name
         assert picture.caption.endswith(".")
+
+
+def test_joints_have_the_colour_of_their_side_and_those_of_both_sides_another(account):
+    body = sk.robot_from_text(humanoid(waist="yaw"), name="body")
+    colours = joint_colours(replace(account, robot=body), "grey")
+    sides = {side: {c for name, c in colours.items() if name.startswith(side)} for side in ("right", "left")}
+    assert [len(found) for found in sides.values()] == [1, 1]
+    assert len(sides["right"] | sides["left"] | {"grey"}) == 3
+    assert {c for name, c in colours.items() if not name.startswith(("right", "left"))} == {"grey"}
+    assert {*colours} == {*body.joint_names}
 
 
 def test_progress_rises_to_one(saved):
