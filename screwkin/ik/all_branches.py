@@ -276,4 +276,4 @@ def branch_programs(chain: SerialChain) -> list[Program]:
     """What ``branch_solutions`` runs for a limb."""
     whole = of_six(chain)
     own = [relative_branches(whole)] if by_relative(whole) else elimination_programs(whole)
-    return [*own, *{id(limb): steps(limb) for limb in (whole, chain)}.values()]
+    return [*own, *map(steps, [whole] if whole is chain else [whole, chain])]
