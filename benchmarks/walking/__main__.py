@@ -30,9 +30,13 @@ def arguments(words: list[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--seeds", type=Path, default=SEEDS, help="tuning.txt beside it is for choosing gains"
     )
-    parser.add_argument("--rows", type=Path, default=ROOT / "walking.jsonl")
-    parser.add_argument("-o", "--output", type=Path, default=ROOT / "results" / "walking.md")
-    return parser.parse_args(words)
+    parser.add_argument("--rows", type=Path, help="default: results/walking.jsonl, or beside other seeds")
+    parser.add_argument("-o", "--output", type=Path, help="default: the page of that name beside the rows")
+    asked = parser.parse_args(words)
+    judged = ROOT / "results" / "walking.jsonl"
+    asked.rows = asked.rows or (judged if asked.seeds == SEEDS else asked.seeds.with_suffix(".jsonl"))
+    asked.output = asked.output or asked.rows.with_suffix(".md")
+    return asked
 
 
 def rows_of(path: Path) -> list[Row]:
