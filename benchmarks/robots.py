@@ -63,6 +63,8 @@ def row_of(path: Path) -> Row:
         row["reason"] = str(error).splitlines()[0]
     except Exception as error:  # a fault of the program is a row too, and not the end of a campaign
         row["reason"] = f"unexpected {type(error).__name__}: {error}"
+    if "reason" in row:
+        row["reason"] = row["reason"].replace(str(path), row["file"])
     row.pop("robot", None)
     return row
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from benchmarks.robots import ENGINES, ROWS, page_of, passed, read_rows
+from benchmarks.robots import ENGINES, ROWS, page_of, passed, read_rows, row_of
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "robots.md"
 
@@ -38,3 +38,12 @@ def test_a_robot_chosen_unseen_keeps_the_verdict_of_its_first_try(tmp_path: Path
         ("a", True, False),
         ("b", True, None),
     ]
+
+
+def test_a_refusal_names_no_folder_of_the_computer_that_ran_it(tmp_path: Path) -> None:
+    path = tmp_path / "repository" / "urdf" / "robot.urdf"
+    path.parent.mkdir(parents=True)
+    path.write_text('<robot xmlns:xacro="http://www.ros.org/wiki/xacro" name="a"><xacro:b/></robot>')
+    row = row_of(path)
+    assert row["reason"].startswith("repository/urdf/robot.urdf")
+    assert str(tmp_path) not in row["reason"]
