@@ -12,13 +12,13 @@ import warnings
 from dataclasses import asdict
 from pathlib import Path
 
-from benchmarks.environments import ROOT
 from benchmarks.machine import pin_threads
 from benchmarks.walking.page import markdown
 from benchmarks.walking.pieces import ENGINES, SERVOS, WAYS, WORLDS, Piece, Row, pieces, row_of
 from screwkin.campaign.plan import load_seeds
 
 SEEDS = Path(__file__).with_name("judging.txt")
+ROWS = Path(__file__).parents[1] / "results" / "walking.jsonl"
 
 
 def arguments(words: list[str] | None) -> argparse.Namespace:
@@ -33,8 +33,7 @@ def arguments(words: list[str] | None) -> argparse.Namespace:
     parser.add_argument("--rows", type=Path, help="default: results/walking.jsonl, or beside other seeds")
     parser.add_argument("-o", "--output", type=Path, help="default: the page of that name beside the rows")
     asked = parser.parse_args(words)
-    judged = ROOT / "results" / "walking.jsonl"
-    asked.rows = asked.rows or (judged if asked.seeds == SEEDS else asked.seeds.with_suffix(".jsonl"))
+    asked.rows = asked.rows or (ROWS if asked.seeds == SEEDS else asked.seeds.with_suffix(".jsonl"))
     asked.output = asked.output or asked.rows.with_suffix(".md")
     return asked
 
