@@ -18,8 +18,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--quick", action="store_true", help="tiny sizes: does it run, do results agree?")
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "results")
     asked = parser.parse_args(arguments)
-    pin_threads()
-    # Only now: these import libraries that read at import how many threads to start.
+    # Only now: --help needs none of these, and they take a while.
     from benchmarks.cases import FULL, QUICK, robot_of
     from benchmarks.report import markdown
     from benchmarks.run import WORKLOADS, run
@@ -37,5 +36,6 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
+    pin_threads()
     keep_memory()
     sys.exit(main())

@@ -85,6 +85,6 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    pin_threads()  # what starts anew then imports libraries that read it
+    pin_threads()
     keep_memory()
     sys.exit(main())

@@ -92,7 +92,6 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--rows", type=Path, default=ROOT / "identification.jsonl")
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "results" / "identification.md")
     asked = parser.parse_args(arguments)
-    pin_threads()
     logs = [load_bench_log(path) for path in asked.logs]
     asked.rows.parent.mkdir(parents=True, exist_ok=True)
     text = asked.rows.read_text(encoding="utf-8") if asked.rows.exists() else ""
@@ -113,4 +112,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
+    pin_threads()
     raise SystemExit(main())

@@ -6,7 +6,7 @@ import os
 import platform
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import metadata
 from pathlib import Path
 
@@ -22,16 +22,21 @@ KEPT_MEMORY = {
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
 
 
-def pin_threads(count: int = 1) -> None:
-    """One thread for the libraries that start their own; must come before they are imported."""
-    for name in THREADS:
-        os.environ.setdefault(name, str(count))
+def pin_threads() -> None:
+    """One thread for the libraries that start their own, which they read when they are imported."""
+    _begin_with(dict.fromkeys(THREADS, "1"))
 
 
 def keep_memory() -> None:
-    """On Linux, start this program anew with ``KEPT_MEMORY``, which glibc reads at the start."""
-    if sys.platform == "linux" and not KEPT_MEMORY.keys() <= os.environ.keys():
-        os.execve(sys.executable, [sys.executable, *sys.orig_argv[1:]], {**KEPT_MEMORY, **os.environ})
+    """On Linux, ``KEPT_MEMORY``, which glibc reads at the start."""
+    if sys.platform == "linux":
+        _begin_with(KEPT_MEMORY)
+
+
+def _begin_with(variables: Mapping[str, str]) -> None:
+    """Start this program anew with these variables of the environment, where they are not set."""
+    if not variables.keys() <= os.environ.keys():
+        os.execve(sys.executable, [sys.executable, *sys.orig_argv[1:]], {**variables, **os.environ})
 
 
 def description(packages: Sequence[str]) -> dict[str, object]:

@@ -179,7 +179,6 @@ def main() -> None:
     parser.add_argument("--again", action="store_true", help="also files that have a row")
     parser.add_argument("--page", type=Path)
     asked = parser.parse_args()
-    pin_threads()
     warnings.simplefilter("ignore")
     done = {row["file"] for row in read_rows(asked.rows)}
     for path in files_of(asked.places):
@@ -205,4 +204,5 @@ def read_rows(path: Path) -> list[Row]:
 
 
 if __name__ == "__main__":
+    pin_threads()
     main()

@@ -164,7 +164,6 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.roofline", description=__doc__)
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "results")
     asked = parser.parse_args(arguments)
-    pin_threads()
     import screwkin as sk
     from screwkin.compiler.native import compiler
 
@@ -179,4 +178,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
+    pin_threads()
     sys.exit(main())

@@ -185,7 +185,6 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--rows", type=Path, default=ROOT / "solvers.jsonl")
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "results" / "solvers.md")
     asked = parser.parse_args(arguments)
-    pin_threads()
     warnings.simplefilter("ignore")
     asked.rows.parent.mkdir(parents=True, exist_ok=True)
     text = asked.rows.read_text(encoding="utf-8") if asked.rows.exists() else ""
@@ -206,4 +205,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
+    pin_threads()
     raise SystemExit(main())

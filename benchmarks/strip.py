@@ -60,7 +60,6 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("-o", "--output", type=Path, default=PICTURE)
     parser.add_argument("--across", type=int, default=5, help="pictures in a line")
     asked = parser.parse_args(arguments)
-    pin_threads()
     warnings.simplefilter("ignore")
     walking = {row["file"] for row in read_rows(asked.rows) if passed(row)}
     whole = strip([path for path in files_of(asked.places) if file_of(path) in walking], asked.across)
@@ -70,4 +69,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
+    pin_threads()
     raise SystemExit(main())

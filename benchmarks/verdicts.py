@@ -171,7 +171,6 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--so-far", action="store_true", help="no walk: only the result of finished ones")
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "results")
     asked = parser.parse_args(arguments)
-    pin_threads()
     words = [word for word in asked.only.split(",") if word]
     wanted = [walk for walk in walks() if all(word in walk.title for word in words)]
     if asked.limit and asked.limit < len(wanted):
@@ -197,4 +196,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
+    pin_threads()
     sys.exit(main())

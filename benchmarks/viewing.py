@@ -223,7 +223,6 @@ def main() -> None:
     if asked.example:
         viser_example(asked.example == "plain")
         return
-    pin_threads()
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as driver:
@@ -250,4 +249,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    pin_threads()
     main()

@@ -20,7 +20,6 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help="few rounds, small batches")
     parser.add_argument("-o", "--output", type=Path, default=ROOT / "alternatives")
     asked = parser.parse_args()
-    pin_threads()
     if util.find_spec("casadi") is None:
         python = environment("alternatives", ["casadi"])
         if python is None:
@@ -34,4 +33,5 @@ def main() -> int:
 
 
 if __name__ == "__main__":
+    pin_threads()
     sys.exit(main())

@@ -51,7 +51,6 @@ def identity(row: Row) -> tuple[object, ...]:
 
 def main(words: list[str] | None = None) -> int:
     asked, began = arguments(words), time.monotonic()
-    pin_threads()
     warnings.simplefilter("ignore")
     asked.rows.parent.mkdir(parents=True, exist_ok=True)
     rows = rows_of(asked.rows)
@@ -87,4 +86,5 @@ def _ended(path: Path) -> bool:
 
 
 if __name__ == "__main__":
+    pin_threads()
     raise SystemExit(main())
