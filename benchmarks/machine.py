@@ -7,9 +7,11 @@ import platform
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
+from datetime import date
 from importlib import metadata
 from pathlib import Path
 
+import screwkin
 from benchmarks.compiler import compiler
 
 WIDE = ("avx", "avx2", "fma", "avx512f", "avx512dq", "asimd", "sve")
@@ -40,11 +42,12 @@ def _begin_with(variables: Mapping[str, str]) -> None:
 
 
 def description(packages: Sequence[str]) -> dict[str, object]:
-    """Processor, cores, wide instructions, versions; and how busy the machine was."""
+    """Processor, cores, wide instructions, versions; the day, and how busy the machine was."""
     facts = _processor()
     flags = facts.get("flags", facts.get("Features", "")).split()
     names = {key: facts.get(key, "") for key in ("model name", "cpu family", "model")}
     return {
+        "day": date.today().isoformat(),
         "processor": " ".join(names["model name"].split()) or platform.machine(),
         "family": f"{names['cpu family']} model {names['model']}" if names["model"] else "",
         "cores": os.cpu_count(),
@@ -60,9 +63,9 @@ def description(packages: Sequence[str]) -> dict[str, object]:
 
 
 def version_of(package: str) -> str:
-    """Its version; empty where it is not installed."""
+    """Its version, empty where it is not installed; ours as the code says: a linked checkout may be newer."""
     try:
-        return metadata.version(package)
+        return screwkin.__version__ if package == "screwkin" else metadata.version(package)
     except metadata.PackageNotFoundError:
         return ""
 

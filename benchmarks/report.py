@@ -33,7 +33,7 @@ def _machine(machine: dict[str, Any]) -> list[str]:
         f"{processor}, {machine['cores']} cores, {' '.join(machine['instructions'])}; "
         f"{machine['system']}; load {machine['load']} at the start; one thread where nothing else is said; "
         f"memory of results {machine['memory']}.",
-        f"{machine['compiler']}; Python {machine['python']}, {versions}.",
+        f"{machine['compiler']}; Python {machine['python']}, {versions}. Measured on {machine['day']}.",
     ]
 
 

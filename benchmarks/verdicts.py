@@ -158,7 +158,7 @@ def _machine() -> str:
     """Processor and versions in a line."""
     facts = description(("screwkin", "mujoco", "pybullet"))
     versions = ", ".join(f"{name} {version}" for name, version in dict(facts["versions"]).items())  # type: ignore[call-overload]
-    return f"{facts['processor']}; Python {facts['python']}, {versions}."
+    return f"{facts['processor']}; Python {facts['python']}, {versions}. Written on {facts['day']}."
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -6,14 +6,17 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from unittest.mock import patch
 
-from benchmarks.machine import THREADS
+import screwkin
+from benchmarks.machine import THREADS, description
 
 ROOT = Path(__file__).parents[2]
 PINNED = """
 import os
 import numpy
-from benchmarks.machine import THREADS, pin_threads
+import screwkin
+from benchmarks.machine import THREADS, description, pin_threads
 print("begins", flush=True)
 pin_threads()
 print(*(os.environ[name] for name in THREADS))
@@ -41,3 +44,10 @@ def test_threads_are_pinned_before_numpy_is_imported() -> None:
 
 def test_threads_that_the_environment_pins_stay_as_they_are() -> None:
     assert begun(**dict.fromkeys(THREADS, "2")) == ["begins", "2 2 2 2"]
+
+
+def test_pages_name_the_version_of_the_code_that_ran() -> None:
+    """An environment that links to a checkout keeps the version with which the link was made."""
+    with patch("importlib.metadata.version", return_value="0.0.1"):
+        facts = description(("screwkin", "numpy"))
+    assert facts["versions"] == {"screwkin": screwkin.__version__, "numpy": "0.0.1"}
