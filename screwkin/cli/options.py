@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -41,6 +41,17 @@ Perturbed = Annotated[
         ".toml file with [perturbation]; repeatable.",
     ),
 ]
+
+
+def refuse_together(options: Mapping[str, object]) -> None:
+    """Refuse options that exclude each other, if several are given: those that are neither None nor False.
+
+    Raises:
+        InputError: several are given.
+    """
+    given = [name for name, value in options.items() if value is not None and value is not False]
+    if len(given) > 1:
+        raise InputError(f"{' and '.join(given)} exclude each other; give one of them")
 
 
 def perturbation_of(texts: Sequence[str]) -> Perturbation:

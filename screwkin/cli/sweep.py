@@ -34,7 +34,15 @@ from screwkin.campaign.statistics import Paired, Tally, comparisons, tallies, ta
 from screwkin.campaign.store import Journal, journal
 from screwkin.campaign.world import AS_PLANNED, check_world
 from screwkin.cli.folder import output_folder
-from screwkin.cli.options import AsJson, FittingGait, GaitName, OutputFolder, RobotName, settings
+from screwkin.cli.options import (
+    AsJson,
+    FittingGait,
+    GaitName,
+    OutputFolder,
+    RobotName,
+    refuse_together,
+    settings,
+)
 from screwkin.cli.output import aligned, drawn, print_json, progress_bar, remark, say
 from screwkin.cli.simulation import engine as engine_named
 from screwkin.cli.sweep_optimise import bounds_of, optimise
@@ -123,12 +131,12 @@ def sweep(
     table = load_robot(robot)
     if auto and not table.limbs:
         table = limbed(table)
-    _refuse_together({"--auto": auto, "--gait": gait, "--set gait": _sets(assignments or [], "gait")})
-    _refuse_together({"--perturb": perturb, "--set perturb": _sets(assignments or [], "perturb")})
-    _refuse_together({"--feedback": feedback, "--set feedback": _sets(assignments or [], "feedback")})
-    _refuse_together({"--seeds": seeds, "--runs": runs})
-    _refuse_together({"--seeds": seeds, "--seed": seed})
-    _refuse_together({"--jobs": jobs, "--cluster": cluster})
+    refuse_together({"--auto": auto, "--gait": gait, "--set gait": _sets(assignments or [], "gait")})
+    refuse_together({"--perturb": perturb, "--set perturb": _sets(assignments or [], "perturb")})
+    refuse_together({"--feedback": feedback, "--set feedback": _sets(assignments or [], "feedback")})
+    refuse_together({"--seeds": seeds, "--runs": runs})
+    refuse_together({"--seeds": seeds, "--seed": seed})
+    refuse_together({"--jobs": jobs, "--cluster": cluster})
     bounds, fixed = bounds_of(assignments or []) if objective else ({}, assignments or [])
     axes = _axes(
         fixed,
@@ -168,13 +176,6 @@ def sweep(
     for line in _failures(done, "" if chosen else TO_FIT):
         remark(line)
     return 1 if total.crashed else 0
-
-
-def _refuse_together(options: Mapping[str, object]) -> None:
-    """Refuse options that exclude each other, if several are given: those that are neither None nor False."""
-    given = [name for name, value in options.items() if value is not None and value is not False]
-    if len(given) > 1:
-        raise InputError(f"{' and '.join(given)} exclude each other; give one of them")
 
 
 def _sets(assignments: Sequence[str], key: str) -> bool:

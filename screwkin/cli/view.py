@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from screwkin.cli.options import AsJson, FittingGait
+from screwkin.cli.options import AsJson, FittingGait, refuse_together
 from screwkin.cli.output import print_json, progress_bar, say
 from screwkin.cli.walk import advice_to_fit, limbed
 from screwkin.errors import InputError
@@ -73,8 +73,7 @@ def view(
 
 def _session(what: str, gait: str | None, auto: bool, steps: int) -> Session:
     """What the command line asks to see."""
-    if auto and gait is not None:
-        raise InputError("--auto chooses the gait; leave --gait out")
+    refuse_together({"--auto": auto, "--gait": gait})
     if Path(what).suffix.lower() == ".npz":
         if auto or gait is not None:
             option = "--auto" if auto else "--gait"

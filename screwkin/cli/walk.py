@@ -14,7 +14,16 @@ from screwkin.analysis.account import Account, account_of
 from screwkin.anatomy.humanoid import anatomy
 from screwkin.cli.compensated import CompensateBy, Passes, ServoStiffness, compensated, remedy
 from screwkin.cli.folder import output_folder
-from screwkin.cli.options import AsJson, FittingGait, GaitName, OutputFolder, RobotName, numbers_of, settings
+from screwkin.cli.options import (
+    AsJson,
+    FittingGait,
+    GaitName,
+    OutputFolder,
+    RobotName,
+    numbers_of,
+    refuse_together,
+    settings,
+)
 from screwkin.cli.output import aligned, drawn, print_json, progress_bar, remark, say
 from screwkin.errors import InputError, NoSolutionError
 from screwkin.files import atomic_write
@@ -87,14 +96,13 @@ def walk(
     outside the support polygon is a warning; the trajectory is written all the same. Walks over footsteps, to
     goals and along curves begin and end at home (--set lead=0: they do not).
     """
+    refuse_together({"--auto": auto, "--gait": gait})
     refuse_dh(robot, "a walk")
     table = load_robot(robot)
     if auto and not table.limbs:
         table = limbed(table)
     wanted = remedy(table, compensate, passes, k)
     assignments = [*(assignments or []), *([] if com is None else [f"com={com}"])]
-    if auto and gait is not None:
-        raise InputError("--auto chooses the gait; leave --gait out")
     where = _where_to(list_of_steps, goals or [], curve, places or [])
     name = gait or (stepping_gait(table.name) if where else default_gait(table.name))
     chosen = changed(fitting_gait(table) if auto else load_gait(name), assignments, rate)

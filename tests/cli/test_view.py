@@ -38,7 +38,8 @@ def test_a_robot_a_linkage_and_a_motion_are_shown(cli, shown, walked):
 def test_auto_shows_the_gait_that_walk_would_fit(cli, shown, refused, walked):
     assert cli("view", "poppy12", "--auto").code == 0
     assert shown[0].gait.to_dict() == fitting_gait(sk.load_robot("poppy12")).to_dict()
-    assert "leave --gait out" in refused(cli("view", "poppy12", "--auto", "--gait", "walk"), 2)
+    both = refused(cli("view", "poppy12", "--auto", "--gait", "walk"), 2)
+    assert "--auto and --gait exclude each other" in both
     assert "leave --auto out" in refused(cli("view", walked / "trajectory.npz", "--auto"), 2)
 
 

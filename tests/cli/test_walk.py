@@ -223,7 +223,7 @@ def test_plots_and_report_are_written_beside_the_trajectory(cli, tmp_path):
     assert not [name for name in names if name.startswith(".")]
 
 
-def test_auto_chooses_a_gait_and_writes_it_with_the_robot_beside_the_trajectory(cli, tmp_path):
+def test_auto_chooses_a_gait_and_writes_it_with_the_robot_beside_the_trajectory(cli, refused, tmp_path):
     told = cli(
         "walk", "bioloid", "--auto", "--steps", 1, "--rate", 20, "--no-plots", "-o", "a", "--json"
     ).data
@@ -236,7 +236,8 @@ def test_auto_chooses_a_gait_and_writes_it_with_the_robot_beside_the_trajectory(
     one, two = (sk.load_trajectory(tmp_path / folder / "trajectory.npz") for folder in "ab")
     np.testing.assert_array_equal(one.q, two.q)
     assert again["gait"] == "auto"
-    assert cli("walk", "bioloid", "--auto", "--gait", "walk").code == 2
+    both = refused(cli("walk", "bioloid", "--auto", "--gait", "walk"), 2)
+    assert "--auto and --gait exclude each other" in both
 
 
 @pytest.mark.parametrize("words", [[], ["--gait", "walk"], ["--auto"]], ids=str)
