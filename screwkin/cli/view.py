@@ -10,7 +10,7 @@ import typer
 
 from screwkin.cli.options import AsJson, FittingGait, refuse_together
 from screwkin.cli.output import print_json, progress_bar, say
-from screwkin.cli.walk import advice_to_fit, limbed
+from screwkin.cli.walk import TO_FIT, limbed
 from screwkin.errors import InputError
 from screwkin.gait.files import default_gait, load_gait
 from screwkin.gait.fitting import fitting_gait
@@ -56,9 +56,7 @@ def view(
         check_film(film)
     session = _session(what, gait, auto, steps)
     if film is not None:
-        unchosen = gait is None and not auto and session.track is None
-        with advice_to_fit(default=unchosen and session.robot.base == "floating"):
-            return _filmed(session, what, film, as_json)
+        return _filmed(session, what, film, as_json)
 
     def ready(url: str) -> None:
         if as_json:
@@ -88,9 +86,10 @@ def _session(what: str, gait: str | None, auto: bool, steps: int) -> Session:
     if auto:
         robot = robot if robot.limbs else limbed(robot)
         return begun(robot, fitting_gait(robot), steps)
+    advice = TO_FIT if gait is None and robot.base == "floating" else ""
     if gait is None and not walks(robot):
-        return begun(robot)
-    return begun(robot, load_gait(gait or default_gait(robot.name)), steps)
+        return begun(robot, advice=advice)
+    return begun(robot, load_gait(gait or default_gait(robot.name)), steps, advice)
 
 
 def walks(robot: Robot) -> bool:
@@ -117,7 +116,8 @@ def _filmed(session: Session, what: str, film: Path, as_json: bool) -> int:
             session = replanned(session)
         done(0.3)
         if session.track is None:
-            raise InputError(f"{what}: there is no motion to film; {session.note or 'name a trajectory.npz'}")
+            why = session.note or f"name a trajectory.npz{session.advice}"
+            raise InputError(f"{what}: there is no motion to film; {why}")
         path = write_film(session.robot, session.track, film)
     if as_json:
         print_json({"url": None, "robot": session.robot.name, "film": str(path)})

@@ -35,6 +35,7 @@ class Session:
         track: the motion that is played, if there is one.
         clock: of the motion.
         note: what to tell of the last thing that was asked for.
+        advice: what ends the note that the gait cannot be planned as it is, before any slider is moved.
     """
 
     robot: Robot
@@ -47,6 +48,7 @@ class Session:
     track: Track | None = None
     clock: Playhead = field(default_factory=lambda: Playhead(0.0))
     note: str = ""
+    advice: str = ""
 
     @property
     def sample(self) -> int | None:
@@ -65,10 +67,10 @@ class Session:
         )
 
 
-def begun(robot: Robot, gait: Gait | None = None, steps: int = 4) -> Session:
+def begun(robot: Robot, gait: Gait | None = None, steps: int = 4, advice: str = "") -> Session:
     """A robot as it stands, before any motion."""
     T, q = first_pose(robot)
-    return Session(robot, T, q, displacements(robot, T, q), gait=gait, steps=steps)
+    return Session(robot, T, q, displacements(robot, T, q), gait=gait, steps=steps, advice=advice)
 
 
 def with_motion(session: Session, trajectory: Trajectory, note: str = "") -> Session:
@@ -102,7 +104,7 @@ def replanned(session: Session, plan: Callable[..., Trajectory] | None = None) -
         gait = session.gait.replace(**session.changes) if session.changes else session.gait
         trajectory = (plan or _walked)(session.robot, gait, session.steps)
     except ScrewkinError as error:
-        return replace(session, note=f"not planned: {error}")
+        return replace(session, note=f"not planned: {error}{'' if session.changes else session.advice}")
     least = 1e3 * float(trajectory.margin.min())
     way = trajectory.T_world_base[-1, :2, 3] - trajectory.T_world_base[0, :2, 3]
     walked = f"{np.linalg.norm(way):.3f} m in {trajectory.duration:.1f} s"

@@ -4,6 +4,7 @@ import pytest
 
 import screwkin as sk
 import screwkin.cli.view as verb
+from screwkin.cli.walk import TO_FIT
 from screwkin.gait.fitting import fitting_gait
 from tests.bodies import humanoid
 
@@ -29,7 +30,7 @@ def test_a_robot_a_linkage_and_a_motion_are_shown(cli, shown, walked):
     assert "Ctrl-C" in cli("view", "linkages/four-bar").out
     assert cli("view", walked / "trajectory.npz").code == 0
     robot, linkage, motion = shown
-    assert (robot.gait.name, robot.track) == ("walk", None)
+    assert (robot.gait.name, robot.track, robot.advice) == ("walk", None, TO_FIT)
     assert (linkage.gait, linkage.track) == (None, None)
     assert (motion.gait.name, motion.steps) == ("paper", 2)
     assert motion.track.duration == pytest.approx(sk.load_trajectory(walked / "trajectory.npz").duration)

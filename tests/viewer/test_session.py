@@ -146,6 +146,18 @@ def test_a_gait_that_cannot_be_walked_leaves_the_motion_and_says_why(robot, traj
     assert after.track is session.track
 
 
+def test_advice_ends_the_note_of_a_gait_that_nobody_changed(robot):
+    """Once a slider was moved, what cannot be walked is the slider's."""
+
+    def plan(*_):
+        raise NoSolutionError("the right leg cannot reach")
+
+    session = begun(robot, sk.load_gait("paper"), advice="; or another gait")
+    assert replanned(session, plan).note == "not planned: the right leg cannot reach; or another gait"
+    assert handled(session, {"gait waist_height": 0.4}).note.startswith("not planned: ")
+    assert "another" not in handled(session, {"gait waist_height": 0.4}).note
+
+
 def test_without_a_motion_nothing_plays(robot):
     session = begun(robot)
     assert session.reading == "no motion yet"
