@@ -48,7 +48,7 @@ class FootPath:
     rate: float = 50.0
 
 
-def foot_from_waist(path: FootPath, side: int) -> Array:
+def foot_along(path: FootPath, side: int) -> Array:
     """Position (phases * duration * rate, 3) of a foot's sole relative to the waist [m].
 
     Feet swing in turn, the left one first, by minimum-jerk motion forward and a cosine bump upward. The ZMP
@@ -114,7 +114,7 @@ def random_targets(chain: SerialChain, poses: int, seed: int) -> Array:
 def walking_targets(chain: SerialChain, path: FootPath) -> Array:
     """Tip poses (T, 4, 4) in the base frame along a walk, the sole level as in the zero pose."""
     home = as_array(chain.tip).astype(float)
-    places = foot_from_waist(path, 1 if home[1, 3] >= 0 else -1)
+    places = foot_along(path, 1 if home[1, 3] >= 0 else -1)
     target = np.tile(home, (len(places), 1, 1))
     target[:, :3, 3] = places + np.array([home[0, 3], 0.0, 0.0])
     return target

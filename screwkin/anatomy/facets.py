@@ -83,13 +83,13 @@ def _normals(hull: Any, up: Array) -> list[Array]:
 def _facet(points: Array, normal: Array, band: float) -> Facet:
     heights = points @ normal
     near = points[heights <= heights.min() + band]
-    flat = near @ across(normal)
+    flat = near @ axes_across(normal)
     outline = flat[hull_of(flat)]
     return Facet(normal, float(heights.min()), near, area_of(outline))
 
 
-def across(up: Array) -> Array:
-    """Two unit vectors (3, 2) that span the plane across a direction."""
+def axes_across(up: Array) -> Array:
+    """Two unit vectors (3, 2) that span the plane axes_across a direction."""
     e = np.eye(3)[int(np.argmin(np.abs(up)))]
     first = np.cross(up, e)
     first = first / np.linalg.norm(first)

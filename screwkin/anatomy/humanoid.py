@@ -30,7 +30,7 @@ from screwkin.anatomy.record import Anatomy
 from screwkin.anatomy.skeleton import Skeleton
 from screwkin.anatomy.soles import FootShape, feet_of
 from screwkin.anatomy.symmetry import TILT, Symmetry, symmetry_of
-from screwkin.anatomy.turned import seen_from
+from screwkin.anatomy.turned import with_base_at
 from screwkin.anatomy.written import commented_table
 from screwkin.errors import expect
 from screwkin.kinematics.body import frame_pose
@@ -104,7 +104,7 @@ def _built(
     R, offset = np.array([forward.direction, left, stance.up]), sense * symmetry.offset
     R = np.where(np.abs(R - np.round(R)) < 1e-9, np.round(R), R) + 0.0
     turn = rotation_from_array(R)
-    whole = robot if (np.eye(3) == R).all() else seen_from(robot, Pose(turn, ZERO))
+    whole = robot if (np.eye(3) == R).all() else with_base_at(robot, Pose(turn, ZERO))
     own = [foot.turned(R) for foot in (feet if sense > 0 else feet[::-1])]
     footing = footings(own[0], own[1], offset, stance.length, band_of(stance))
     _refuse_no_soles(robot, own, footing, stance)

@@ -14,8 +14,8 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.anatomy.facets import (
     Facet,
-    across,
     area_of,
+    axes_across,
     centroid_of,
     facet_below,
     hull_of,
@@ -50,7 +50,7 @@ class FootShape:
     @property
     def center(self) -> Array:
         """Centroid (3,) of the facet [m]."""
-        plane = across(self.facet.up)
+        plane = axes_across(self.facet.up)
         flat = self.facet.points @ plane
         return np.asarray(plane @ centroid_of(flat[hull_of(flat)]) + self.facet.up * self.facet.height)
 
@@ -100,7 +100,9 @@ def _foot(skeleton: Skeleton, stance: Standing, outline: Outline, root: int) -> 
         last = skeleton.robot.path_to(skeleton.robot.tree[last].parent)[-1]
         higher = _standing(skeleton, stance, outline, root, last)
         own = outline.of([higher.link])
-        near = own[own @ higher.facet.up <= higher.facet.height + band_of(stance)] @ across(higher.facet.up)
+        near = own[own @ higher.facet.up <= higher.facet.height + band_of(stance)] @ axes_across(
+            higher.facet.up
+        )
         if len(near) < 3 or area_of(near[hull_of(near)]) < CARRIES * higher.facet.area:
             break
         foot = higher

@@ -16,7 +16,7 @@ T = TypeVar("T")
 R = TypeVar("R", bound=RobotRecord)
 
 
-def seen_from(robot: R, T_new_old: Pose) -> R:
+def with_base_at(robot: R, T_new_old: Pose) -> R:
     """The robot with its base frame elsewhere on the base link.
 
     Boxes have their edges along the base axes: where these turn by anything but right angles, boxes become

@@ -15,7 +15,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.compliance.balance import ElasticBalance
-from screwkin.compliance.equilibrium import at_rest, balances
+from screwkin.compliance.equilibrium import balances, resting_deflections
 from screwkin.compliance.laws import Spring
 from screwkin.compliance.springs import SpringChoice
 from screwkin.compliance.stiffness import loaded_robot
@@ -49,7 +49,7 @@ def cartesian_compliance(
         InputError, ShapeError, UnknownNameError, NoSolutionError: as for ``cartesian_stiffness``.
     """
     loaded, _, batch = loaded_robot(robot, state, support, stiffness, gravity, loads, springs)
-    theta, stable = at_rest(loaded)
+    theta, stable = resting_deflections(loaded)
     C = np.empty((len(loaded.q), 6, 6))
     for rows, here in balances(loaded, theta):
         free = np.flatnonzero(~stable[rows])
@@ -108,7 +108,7 @@ def cartesian_stiffness(
     Source: paper B, eq. 15; Klimchik, Chablat and Pashkevich (2014).
     """
     loaded, _, batch = loaded_robot(robot, state, support, stiffness, gravity, loads, springs)
-    theta, _ = at_rest(loaded)
+    theta, _ = resting_deflections(loaded)
     K = np.empty((len(loaded.q), 6, 6))
     for rows, here in balances(loaded, theta):
         B = here.columns(frame)

@@ -18,7 +18,7 @@ from screwkin.algebra.pytrees import pytree
 from screwkin.algebra.se3 import Pose, as_array, pose_from_array, rotation_log, unstack
 from screwkin.compliance.balance import ElasticBalance, Loaded, spring_slopes
 from screwkin.compliance.commands import check_commands
-from screwkin.compliance.equilibrium import at_rest, balances
+from screwkin.compliance.equilibrium import balances, resting_deflections
 from screwkin.compliance.laws import Spring
 from screwkin.compliance.springs import SpringChoice
 from screwkin.compliance.stiffness import loaded_robot
@@ -178,7 +178,7 @@ def _apart(here: ElasticBalance, frames: Sequence[str], targets: Sequence[Array]
 
 def _held_up(robot: Robot, told: Loaded) -> Array:
     """Deflections (B, n) at rest, where nothing moves freely."""
-    theta, stable = at_rest(told)
+    theta, stable = resting_deflections(told)
     if len(free := np.flatnonzero(~stable)):
         raise SingularError(
             f"sample {free[0]}: {robot.name} moves freely in some direction, or is unstable, so that no "

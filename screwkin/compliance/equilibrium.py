@@ -104,7 +104,7 @@ def _settled(loaded: Loaded) -> tuple[Array, Array, Array, Array]:
     return theta, residual, iterations, stable
 
 
-def at_rest(loaded: Loaded) -> tuple[Array, Array]:
+def resting_deflections(loaded: Loaded) -> tuple[Array, Array]:
     """Deflections (B, n) in equilibrium, which every sample must have; and whether it is stable (B,).
 
     Raises:

@@ -19,8 +19,8 @@ from screwkin.compiler.run import run
 from screwkin.ik.closed import EXACT, alike
 from screwkin.ik.elimination import ANGLES, Elimination, vanishing
 from screwkin.ik.polish import polished
-from screwkin.ik.rank import key_of, kind_of, sines, within_limits, worst_excess, wrapped_angles
-from screwkin.ik.ways import across, usable_ways
+from screwkin.ik.rank import key_of, sines, solution_kind, within_limits, worst_excess, wrapped_angles
+from screwkin.ik.ways import shared_plane, usable_ways
 from screwkin.kinematics.serial_chain import SerialChain, per_chain
 
 BLOCK = 512
@@ -61,7 +61,7 @@ def eliminated(chain: SerialChain, target: Array, guess: Array) -> tuple[Candida
     Returns:
         The candidates; and the numbers of the samples that were eliminated in two joints.
     """
-    (first, *others), plane = usable_ways(chain), across(chain)
+    (first, *others), plane = usable_ways(chain), shared_plane(chain)
     found, unsure = _by(chain, first, target, guess)
     shared = np.zeros(len(target), dtype=bool) if plane is None else plane.near(target)
     more = [(plane.way, shared)] if plane is not None else []
@@ -192,7 +192,7 @@ def branch(chain: SerialChain, way: Elimination) -> Program:
     angles, error = polished(chain, q, target)
     q = wrapped_angles(chain, angles)
     worst = worst_excess(chain, q)
-    kind = kind_of(worst, error <= EXACT)
+    kind = solution_kind(worst, error <= EXACT)
     recorder.output("q", q)
     recorder.output("error", [error])
     recorder.output("worst", [worst])

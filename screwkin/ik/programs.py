@@ -21,8 +21,8 @@ from screwkin.ik.rank import (
     INSIDE,
     Pairs,
     key_of,
-    kind_of,
     sines,
+    solution_kind,
     within_limits,
     worst_excess,
     wrapped_angles,
@@ -70,7 +70,7 @@ def limb_branches(chain: SerialChain, position: bool) -> Door:
         solves = error <= EXACT
         clear = (slack > CLEAR) & solves & (abs_(worst - LIMIT_TOLERANCE) > NEAR_LIMIT)
         certified = where(clear | ((slack < -CLEAR) & ~solves), certified, 0.0)
-        rows.append([key_of(angles, near, kind_of(worst, solves)), error, *q])
+        rows.append([key_of(angles, near, solution_kind(worst, solves)), error, *q])
     rows = _sorted(rows)
     kinds = [where(key < -1.5 * INSIDE, 2.0, where(key < -0.5 * INSIDE, 1.0, 0.0)) for key, *_ in rows]
     for one, other in pairwise(rows):

@@ -46,7 +46,7 @@ def wrapped_angles(chain: SerialChain, q: Sequence[Scalar]) -> list[Scalar]:
     return angles
 
 
-def kind_of(worst: Scalar, solves: Scalar) -> Scalar:
+def solution_kind(worst: Scalar, solves: Scalar) -> Scalar:
     """2 for a solution inside the limits, 1 for one outside, 0 for none."""
     return where(solves, where(worst <= LIMIT_TOLERANCE, 2.0, 1.0), 0.0)
 

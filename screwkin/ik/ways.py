@@ -83,7 +83,7 @@ class Plane:
 
 
 @per_chain
-def across(chain: SerialChain) -> Plane | None:
+def shared_plane(chain: SerialChain) -> Plane | None:
     """The plane of motion in which all branches share the angle that is eliminated, None without one."""
     first = elimination(chain)
     if first is None or len(chain.screws) != 6:

@@ -42,7 +42,7 @@ COUNTED: Mapping[str, type] = {
     "worst_joint": int,
 }
 """Arrays of a ``PoseSolution`` (..., limbs), and the kind of their numbers."""
-Limb = tuple[str, SerialChain, Array]
+LimbTarget = tuple[str, SerialChain, Array]
 """A tip, its chain, and its targets in the world: poses (B, 4, 4) or positions (B, 3)."""
 
 
@@ -84,7 +84,7 @@ def solve_whole_body(
     }
     for rows in _apart(robot, tuple(flat)):
         chain, target = limbs[rows[0]][1:]
-        solve: Callable[[_Work, Sequence[Limb], Sequence[int]], None] = _by_newton
+        solve: Callable[[_Work, Sequence[LimbTarget], Sequence[int]], None] = _by_newton
         if any(limb_linkages(robot, limbs[row][1].limb) for row in rows):
             solve = partial(_by_linkages, robot, method)
         elif len(rows) == 1 and method == "auto":
@@ -128,7 +128,7 @@ class _Work:
     settings: IkSettings
 
 
-def _by_closed_form(work: _Work, limbs: Sequence[Limb], rows: Sequence[int]) -> None:
+def _by_closed_form(work: _Work, limbs: Sequence[LimbTarget], rows: Sequence[int]) -> None:
     """One limb by its closed form."""
     base, q, parts, settings = work.base, work.q, work.parts, work.settings
     ((_, chain, target),), (row,) = limbs, rows
@@ -152,7 +152,7 @@ def _by_closed_form(work: _Work, limbs: Sequence[Limb], rows: Sequence[int]) -> 
         parts["worst_joint"][beyond, row] = np.array(joints)[worst]
 
 
-def _by_branches(work: _Work, limbs: Sequence[Limb], rows: Sequence[int]) -> None:
+def _by_branches(work: _Work, limbs: Sequence[LimbTarget], rows: Sequence[int]) -> None:
     """One limb of six joints without closed form."""
     ((tip, chain, target),) = limbs
     base = exact_target("base", checked("base", work.base))
@@ -163,7 +163,7 @@ def _by_branches(work: _Work, limbs: Sequence[Limb], rows: Sequence[int]) -> Non
     _fill(work, system, x, solutions.iterations[:, 0], rows)
 
 
-def _by_newton(work: _Work, limbs: Sequence[Limb], rows: Sequence[int]) -> None:
+def _by_newton(work: _Work, limbs: Sequence[LimbTarget], rows: Sequence[int]) -> None:
     """Limbs that share joints, together."""
     base, q, settings = work.base, work.q, work.settings
     base = exact_target("base", checked("base", base))
@@ -177,7 +177,7 @@ def _by_newton(work: _Work, limbs: Sequence[Limb], rows: Sequence[int]) -> None:
 
 
 def _by_linkages(
-    robot: Robot, method: Method, work: _Work, limbs: Sequence[Limb], rows: Sequence[int]
+    robot: Robot, method: Method, work: _Work, limbs: Sequence[LimbTarget], rows: Sequence[int]
 ) -> None:
     """Limbs with linkages: one limb by the best of all its branches, limbs that share joints by Newton's."""
     base = exact_target("base", checked("base", work.base))

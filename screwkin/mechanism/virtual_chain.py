@@ -18,7 +18,7 @@ from screwkin.model.records import FLOOR
 from screwkin.model.robot import Limb, Robot
 from screwkin.model.state import RIGID
 
-Frame = tuple[tuple[Scalar, ...], ...]
+Rows = tuple[tuple[Scalar, ...], ...]
 """A pose as four rows, which can be compared."""
 
 
@@ -119,7 +119,7 @@ def _home(robot: Robot, place: str) -> tuple[str, Pose]:
     return (FLOOR, IDENTITY) if place == FLOOR else robot.frame(place)
 
 
-def _frame(value: Any, what: str) -> Frame | None:
+def _frame(value: Any, what: str) -> Rows | None:
     """A pose given as an array, as rows of numbers or symbols.
 
     Raises:
@@ -139,7 +139,7 @@ def _frame(value: Any, what: str) -> Frame | None:
     return tuple(tuple(row) for row in rows.tolist())
 
 
-def _pose(frame: Frame | None) -> Pose:
+def _pose(frame: Rows | None) -> Pose:
     if frame is None:
         return IDENTITY
     x = [[y if is_symbolic(y) else structural(y) for y in row] for row in frame[:3]]

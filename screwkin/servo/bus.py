@@ -14,7 +14,6 @@ from typing import Any, Literal
 from screwkin.errors import InputError, needed_for
 from screwkin.servo.driver import DriverPort
 from screwkin.servo.line import (
-    BROADCAST,
     REFUSED,
     BusError,
     ByteLine,
@@ -28,7 +27,7 @@ from screwkin.servo.line import (
     Reply,
     Statistics,
 )
-from screwkin.servo.packets import Instruction, Packet, ProtocolName
+from screwkin.servo.packets import BROADCAST, Instruction, Packet, ProtocolName
 from screwkin.servo.protocols import codec
 
 _MOST_STRANGERS = 8  # sound packets of other servos that are passed over

@@ -16,8 +16,6 @@ ErrorBit = Literal[
 REFUSED: frozenset[ErrorBit] = frozenset(("angle limit", "range", "instruction", "access"))
 """Errors of a command that was not carried out; the others are about the servo's health."""
 
-BROADCAST = 0xFE
-
 
 class BusError(NoSolutionError, OSError):
     """The servo ``id`` does not answer, or not with sense."""

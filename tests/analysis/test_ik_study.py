@@ -12,7 +12,7 @@ from screwkin.analysis import ik_others
 from screwkin.analysis.ik_study import IkRow, fitting_entries, ik_study, measured_row
 from screwkin.analysis.ik_targets import (
     FootPath,
-    foot_from_waist,
+    foot_along,
     random_targets,
     walking_path,
     walking_targets,
@@ -77,7 +77,7 @@ def test_the_joints_move_smoothly_along_the_walk(leg: SerialChain) -> None:
 
 
 def feet() -> tuple[np.ndarray, np.ndarray]:
-    return foot_from_waist(PATH, 1), foot_from_waist(PATH, -1)
+    return foot_along(PATH, 1), foot_along(PATH, -1)
 
 
 def test_one_foot_stands_while_the_other_swings_and_both_in_double_support() -> None:
