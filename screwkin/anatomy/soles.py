@@ -100,9 +100,8 @@ def _foot(skeleton: Skeleton, stance: Standing, outline: Outline, root: int) -> 
         last = skeleton.robot.path_to(skeleton.robot.tree[last].parent)[-1]
         higher = _standing(skeleton, stance, outline, root, last)
         own = outline.of([higher.link])
-        near = own[own @ higher.facet.up <= higher.facet.height + band_of(stance)] @ axes_across(
-            higher.facet.up
-        )
+        up = higher.facet.up
+        near = own[own @ up <= higher.facet.height + band_of(stance)] @ axes_across(up)
         if len(near) < 3 or area_of(near[hull_of(near)]) < CARRIES * higher.facet.area:
             break
         foot = higher

@@ -72,7 +72,7 @@ def player_html(account: Account, check: Validation | None = None) -> str:
     """The player of a trajectory, and of its simulation if there was one."""
     packed = Packed()
     header = {
-        "robot": _robot(account, packed),
+        "robot": _robot(account, check, packed),
         "motions": [_plan(account, packed), *([_simulated(check, packed)] if check else [])],
         "phases": _phases(account),
         "plots": _plots(account, packed),
@@ -96,7 +96,7 @@ def _library() -> str:
     return deflated(files("screwkin.report").joinpath("three.min.js").read_bytes())
 
 
-def _robot(account: Account, packed: Packed) -> dict[str, Any]:
+def _robot(account: Account, check: Validation | None, packed: Packed) -> dict[str, Any]:
     """Joints in the order in which links are carried, and the triangles of every link."""
     robot, names = account.robot, account.robot.link_names
     joints = []
@@ -116,7 +116,11 @@ def _robot(account: Account, packed: Packed) -> dict[str, Any]:
             }
         )
     pieces = pieces_of(robot, COARSE, ground_of(account.trajectory))
-    middle, radius = _around(account, pieces)
+    plan = account.trajectory
+    motions = [(plan.T_world_base, account.motion.q)]
+    if check is not None:
+        motions.append((check.run.T_world_base, check.run.q))
+    middle, radius = _around(robot, pieces, motions)
     return {
         "size": _shown_size(robot, account),
         "middle": middle,
@@ -138,12 +142,22 @@ def _robot(account: Account, packed: Packed) -> dict[str, Any]:
     }
 
 
-def _around(account: Account, pieces: Sequence[Piece]) -> tuple[float, float]:
-    """Height of the middle and radius [m] of a ball that goes with the base and holds all of the robot."""
-    plan, robot = account.trajectory, account.robot
-    rows = np.linspace(0, len(plan.time) - 1, _SEEN).round().astype(int)
-    Ts = displacements(robot, plan.T_world_base[rows], account.motion.q[rows])
-    over = plan.T_world_base[rows][:, None, :3, 3] * [1.0, 1.0, 0.0]
+def _around(
+    robot: Robot, pieces: Sequence[Piece], motions: Sequence[tuple[Array, Array]]
+) -> tuple[float, float]:
+    """Height of the middle and radius [m] of a ball that goes with the base and holds all of the robot.
+
+    Args:
+        robot: whose joints they are.
+        pieces: of its links.
+        motions: T_world_base (T, 4, 4) and q (T, n) of all that the page plays.
+    """
+    rows = [np.linspace(0, len(T) - 1, _SEEN).round().astype(int) for T, _ in motions]
+    T_world_base, q = (
+        np.concatenate([motion[k][own] for motion, own in zip(motions, rows, strict=True)]) for k in (0, 1)
+    )
+    Ts = displacements(robot, T_world_base, q)
+    over = T_world_base[:, None, :3, 3] * [1.0, 1.0, 0.0]
     own = [
         piece.vertices @ Ts[:, piece.link, :3, :3].swapaxes(-1, -2) + Ts[:, piece.link, None, :3, 3] - over
         for piece in pieces

@@ -4,6 +4,7 @@ import base64
 import json
 import re
 import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -155,3 +156,14 @@ def test_the_camera_sees_all_of_the_robot_whatever_it_is_drawn_of(account, parts
     points[..., :2] -= plan.T_world_base[:, None, :2, 3]
     far = np.linalg.norm(points - [0.0, 0.0, middle], axis=-1).max()
     assert far < 1.02 * radius < 1.25 * far
+
+
+def test_the_camera_sees_a_robot_that_leaves_its_plan(account, check):
+    """One that rises by half a metre in the simulation, as no plan has it."""
+    T = check.run.T_world_base.copy()
+    T[:, 2, 3] += np.linspace(0.0, 0.5, len(T))
+    away = replace(check, run=replace(check.run, T_world_base=T))
+    header = json.loads(re.search(r'id="player-header">([^<]*)</script>', player_html(account, away))[1])
+    middle, radius = header["robot"]["middle"], header["robot"]["radius"]
+    assert middle - radius <= 0.0
+    assert middle + radius > T[-1, 2, 3]
