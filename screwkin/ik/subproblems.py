@@ -29,18 +29,11 @@ def turn_onto(s: Vector, a: Vector, b: Vector) -> Scalar:
     return atan2(dot(s, cross(a, b)), minus(dot(a, b), times(dot(s, a), dot(s, b))))
 
 
-def turns_to_level(s: Vector, a: Vector, m: Vector, level: Scalar) -> tuple[Scalar, Scalar]:
-    """The two angles about s at which a, turned, has the scalar product ``level`` with m.
-
-    Out of reach both are the angle of the largest or smallest product.
-    """
-    return level_turns(s, a, m, level)[:2]
-
-
 def level_turns(s: Vector, a: Vector, m: Vector, level: Scalar) -> tuple[Scalar, Scalar, Scalar]:
-    """The angles of ``turns_to_level``, and how far inside reach they are.
+    """The two angles about s at which a, turned, has the scalar product ``level`` with m, and their slack.
 
-    That slack is 1 at best, 0 where both angles are one or none is determined, negative out of reach.
+    The slack says how far inside reach they are: 1 at best, 0 where both angles are one or none is
+    determined, negative out of reach, where both are the angle of the largest or smallest product.
     """
     fixed = times(dot(m, s), dot(s, a))
     along, across, wanted = minus(dot(m, a), fixed), dot(m, cross(s, a)), minus(level, fixed)
