@@ -101,6 +101,8 @@ def ik_study(
     """
     if poses < 1 or cap < 1:
         raise InputError(f"poses is {poses} and cap is {cap}; both must be at least 1")
+    if seed < 0:
+        raise InputError(f"seed is {seed}; expected a whole number, at least 0")
     chain = SerialChain.of(robot, limb)
     entries = fitting_entries(chain, cap)
     sets: list[tuple[str, Array]] = []

@@ -115,7 +115,7 @@ def check_search(search: Search) -> None:
     """Refuse what cannot be searched.
 
     Raises:
-        InputError: unknown objective, bounds that are none, or an axis with several values.
+        InputError: unknown objective, bounds that are none, no evaluations, or an axis with several values.
     """
     several = [key for key, values in search.campaign.axes.items() if len(values) > 1]
     if several:
@@ -123,6 +123,8 @@ def check_search(search: Search) -> None:
     one_of("--optimise", search.objective, OBJECTIVES)
     if not search.bounds:
         raise InputError("--optimise needs bounds of one parameter at least; write --set KEY=LEAST:GREATEST")
+    if search.evaluations < 1:
+        raise InputError(f"--evaluations {search.evaluations}: expected a whole number, at least 1")
     for key, (least, most) in search.bounds.items():
         if not least < most:
             raise InputError(f"--set {key}={least:g}:{most:g}: the least value comes first")

@@ -22,7 +22,7 @@ Faults = Annotated[
 ]
 FormerFaults = Annotated[list[str] | None, typer.Option("--trouble", hidden=True)]
 """The former name of ``--inject-fault``."""
-Seed = Annotated[int, typer.Option(help="Of what is random in faults.")]
+Seed = Annotated[int, typer.Option(min=0, help="Of what is random in faults.")]
 
 
 def injected_faults(*options: Sequence[str] | None, start: float = 0.0) -> list[InjectedFault]:

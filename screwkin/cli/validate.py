@@ -17,7 +17,7 @@ from screwkin.analysis.verdict import verdict_from_json, verdict_of
 from screwkin.campaign.feedback_bound import WORLDS
 from screwkin.cli.feedback_runs import feedback_runs
 from screwkin.cli.folder import output_folder
-from screwkin.cli.options import AsJson, OutputFolder, Perturbed, TrajectoryPath, perturbation_of
+from screwkin.cli.options import AsJson, Perturbed, TrajectoryPath, perturbation_of
 from screwkin.cli.output import aligned, print_json, remark, say
 from screwkin.cli.replay import replay
 from screwkin.cli.simulation import Wish, print_verdict, simulate_to_files
@@ -88,7 +88,12 @@ def validate(
         Path | None,
         typer.Option(metavar="FILE", help="Replay what servos did: the play.npz of a send of it."),
     ] = None,
-    output: OutputFolder = None,
+    output: Annotated[
+        Path | None,
+        typer.Option(
+            "-o", "--output", metavar="DIR", help="Folder for the files; default: the trajectory's."
+        ),
+    ] = None,
     as_json: AsJson = False,
 ) -> int:
     """Simulate a trajectory and give a verdict: validation.json, plots, report.html.

@@ -14,6 +14,7 @@ from screwkin.cli.walk import TO_FIT, limbed
 from screwkin.errors import InputError
 from screwkin.gait.files import default_gait, load_gait
 from screwkin.gait.fitting import fitting_gait
+from screwkin.gait.plan import whole_steps
 from screwkin.gait.record import Gait, gait_from_dict
 from screwkin.model.robot import Robot
 from screwkin.model.table import load_robot
@@ -82,7 +83,7 @@ def _session(what: str, gait: str | None, auto: bool, steps: int) -> Session:
         robot = recorded_robot(trajectory, what)
         own, count = _recorded_gait(trajectory), trajectory.meta.get("steps")
         return with_motion(begun(robot, own, count if isinstance(count, int) else steps), trajectory)
-    robot = load_robot(what)
+    robot, steps = load_robot(what), whole_steps(steps)
     if auto:
         robot = robot if robot.limbs else limbed(robot)
         return begun(robot, fitting_gait(robot), steps)

@@ -31,6 +31,7 @@ from screwkin.gait.files import default_gait, load_gait
 from screwkin.gait.fitting import fitting_gait
 from screwkin.gait.goals import load_curve, steps_along, steps_to
 from screwkin.gait.listed import Footsteps, load_footsteps, with_footsteps
+from screwkin.gait.plan import whole_steps
 from screwkin.gait.record import Gait, Side
 from screwkin.gait.stand import Place, stand
 from screwkin.gait.walk import walk as walk_of
@@ -111,7 +112,7 @@ def walk(
         chosen = with_footsteps(chosen, _steps(table, chosen, first, list_of_steps, goals or [], curve))
     if places and steps is not None:
         raise InputError("--stand makes no steps; leave --steps out")
-    steps = 0 if places else chosen.steps if steps is None else steps
+    steps = 0 if places else whole_steps(chosen.steps if steps is None else steps)
     command = command_of(robot, None if auto else name, steps, assignments, rate, where)
     with output_folder(output, "walk", table.name) as folder:
         with advice_to_fit(default=not (auto or gait or where)):

@@ -80,7 +80,8 @@ def _of_ros(text: str, path: Path) -> tuple[list[str], Array]:
         rows = np.array([[float(x) for x in point["positions"]] for point in data["points"]])
         return names, np.column_stack([time, rows.reshape(len(time), len(names))])
     except (KeyError, TypeError, ValueError, InputError) as error:
+        found = f"key {error} is missing" if isinstance(error, KeyError) else error
         raise TrajectoryError(
-            f"{path}: no trajectory_msgs/JointTrajectory: {type(error).__name__}: {error}; expected"
+            f"{path}: no trajectory_msgs/JointTrajectory: {found}; expected"
             " joint_names, and points with positions and time_from_start (sec, nanosec)"
         ) from None

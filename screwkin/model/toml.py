@@ -35,7 +35,7 @@ def read_text(path: Path, error: type[FileFaults]) -> str:
         found = f"byte {wrong.object[wrong.start]:#04x} is not UTF-8"
         raise error(str(path), [Fault(f"line {line}", "", found, "Save the file as UTF-8")]) from None
     except IsADirectoryError:
-        raise error(str(path), [Fault("file", "", "is a folder", "Give the path of a .toml file")]) from None
+        raise error(str(path), [Fault("file", "", "is a folder", "Give the path of a file")]) from None
     except OSError as wrong:
         found = f"cannot be read ({wrong.strerror})"
         raise error(str(path), [Fault("file", "", found, "Give a readable file")]) from None

@@ -53,7 +53,7 @@ def load_bench_log(path: str | Path) -> BenchLog:
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     except ValueError as error:  # InputError is one, and UnicodeError
-        raise InputError(f"{path} is no JSON file: {error}") from None
+        raise InputError(f"{path}: {error}") from None
     entries = data.get("entries") if isinstance(data, dict) else None
     if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
         raise InputError(f"{path} is no log of a bench: expected mass, length, kp, vin and a list of entries")

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from contextlib import redirect_stdout
 from io import StringIO
+from socket import AF_INET, AF_INET6, socket
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from screwkin.viewer.session import Session, advanced, handled, replanned
 from screwkin.viewer.stage import Stage
 
 HOST, PORT = "127.0.0.1", 8080
+LAST_PORT = 2**16 - 1
 PERIOD = 1 / 40
 """Time between two pictures [s] while a motion plays."""
 READING = 0.25
@@ -52,7 +54,11 @@ def serve(
     """
     with needed_for("The viewer"):
         import viser
+    if not 1 <= port <= LAST_PORT:
+        raise InputError(f"--port {port}: expected a whole number from 1 to {LAST_PORT}")
     try:
+        with socket(AF_INET6 if ":" in host else AF_INET) as probe:
+            probe.bind((host, 0))  # viser would wait forever where it cannot listen
         with redirect_stdout(StringIO()):  # it prints its own table of addresses, to the place of ours
             server = viser.ViserServer(host=host, port=port, verbose=False)
     except OSError as error:
@@ -64,7 +70,8 @@ def serve(
         mailbox = Mailbox()
         stage, panel = Stage(server.scene, session), Panel(server.gui, session, mailbox)
         stage.show(session)
-        ready(f"http://{'localhost' if host == '0.0.0.0' else host}:{server.get_port()}")
+        name = f"[{host}]" if ":" in host else "localhost" if host == "0.0.0.0" else host
+        ready(f"http://{name}:{server.get_port()}")
         _run(server, session, stage, panel, mailbox, going_on)
     finally:
         server.stop()

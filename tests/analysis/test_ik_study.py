@@ -153,6 +153,8 @@ def test_what_cannot_be_studied_is_refused() -> None:
         ik_study(robot, "tail")
     with pytest.raises(InputError, match="poses is 0"):
         ik_study(robot, "left_leg", poses=0)
+    with pytest.raises(InputError, match="seed is -1"):
+        ik_study(robot, "left_leg", seed=-1)
     with pytest.raises(InputError, match="waist is nan"):
         ik_study(robot, "left_leg", waist=float("nan"))
     with pytest.raises(UnreachableError, match=r"with the waist 0\.440 m above the soles") as caught:

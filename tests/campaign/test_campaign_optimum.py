@@ -88,6 +88,7 @@ def test_what_did_not_come_is_not_good(status):
     [
         (search("speed"), "--optimise .speed.; valid: margin, falls"),
         (search(Tc=(2.0, 1.0)), "Tc=2:1"),
+        (search(evaluations=0), "--evaluations 0"),
         (search(axes={**AXES, "lift": ("0.01", "0.02")}), "lift=LEAST:GREATEST"),
         (Search(search().campaign, {}, "margin", 9, 0), "bounds of one parameter"),
     ],

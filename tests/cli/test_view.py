@@ -49,6 +49,7 @@ def test_what_cannot_be_shown_is_refused(cli, refused, shown, walked, tmp_path):
     assert "ends in .gif" in refused(cli("view", "bioloid", "--record", "walk.mp4"), 2)
     assert "no motion to film" in refused(cli("view", "linkages/four-bar", "--record", "a.gif"), 2)
     assert "unknown robot" in refused(cli("view", "bioloidd"), 2)
+    assert "steps is 0" in refused(cli("view", "bioloid", "--steps", 0), 2)
     assert shown == []
     assert list(tmp_path.iterdir()) == []
 
@@ -60,6 +61,20 @@ def test_who_films_a_walk_that_is_none_is_told_of_one_that_fits(cli, refused, tm
     assert refused(cli(*words), 2).rstrip().endswith(advice)
     assert advice not in refused(cli(*words, "--gait", "walk"), 2)
     assert advice not in refused(cli("view", "linkages/four-bar", "--record", "a.gif"), 2)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--port", "0"), "--port 0: expected a whole number from 1 to 65535"),
+        (("--port", "65536"), "--port 65536"),
+        (("--host", "192.0.2.1"), "cannot listen at 192.0.2.1, port 8080"),
+    ],
+)
+def test_an_address_at_which_nobody_can_listen_is_refused(cli, refused, words, message):
+    """192.0.2.1 is of the range that is kept for examples; no computer has it."""
+    pytest.importorskip("viser")
+    assert message in refused(cli("view", "linkages/four-bar", *words), 2)
 
 
 def test_an_interrupt_ends_it_with_130(cli, monkeypatch):

@@ -253,6 +253,10 @@ def test_who_chose_no_gait_is_told_of_one_that_fits(cli, tmp_path, words):
         assert called.err.rstrip().endswith("or fit a gait to the robot: --auto") == (not words)
 
 
+def test_a_number_of_steps_that_is_none_is_no_matter_of_the_gait(cli, refused):
+    assert refused(cli("walk", "bioloid", "--steps", -3), 2).rstrip().endswith("whole number, at least 1")
+
+
 @pytest.mark.parametrize("words", [[], ["--auto"]], ids=str)
 def test_a_dh_table_does_not_walk_and_says_what_it_lacks(cli, tmp_path, words):
     path = tmp_path / "leg.csv"

@@ -140,8 +140,8 @@ def test_files_of_joints_come_back_in_any_order_and_zmp_takes_them(
         ("a.csv", "time,right_knee\n0,1\n0.1,x\n", "row 3: expected 2 numbers"),
         ("a.csv", "right_knee\n0\n", "row 1: expected a header that begins with time"),
         ("a.csv", "time,right_kne\n0,1\n", "'right_kne' is no joint of bioloid. Did you mean 'right_knee'"),
-        ("a.json", '{"points": []}', "no trajectory_msgs/JointTrajectory"),
-        ("a.json", "{", "no trajectory_msgs/JointTrajectory"),
+        ("a.json", '{"points": []}', "no trajectory_msgs/JointTrajectory: key 'joint_names' is missing"),
+        ("a.json", "{", "no trajectory_msgs/JointTrajectory: no JSON: Expecting"),
     ],
 )
 def test_files_that_hold_no_joints_are_refused_with_their_row(
