@@ -28,7 +28,8 @@ from screwkin.gait.driven import arms_of, driven
 from screwkin.gait.realise import free_rotations
 from screwkin.ik.all_branches import has_branches
 from screwkin.ik.closed import recognised
-from screwkin.kinematics.serial_chain import SerialChain
+from screwkin.ik.tied import limb_chain
+from screwkin.kinematics.limits import limits_of
 from screwkin.mechanism.choice import closed_mechanism
 
 ROWS = Path(__file__).resolve().parent / "results" / "robots.jsonl"
@@ -86,10 +87,10 @@ def _leg(whole: sk.Robot) -> tuple[str, float]:
     robot = driven(whole, arms_of(whole)).moving
     limb = next(limb for limb in robot.limbs if limb.kind == "leg")
     free = free_rotations(closed_mechanism(robot)).get(limb.tip, ())
-    chain = SerialChain.of(robot, limb.name, free)
+    chain = limb_chain(robot, limb.name, free)
     form = recognised(chain)
-    rng, joints = np.random.default_rng(1), list(robot.path_to(limb.link))
-    low, high = (np.array([getattr(robot.joints[i], key) for i in joints]) for key in ("lower", "upper"))
+    rng, joints = np.random.default_rng(1), list(robot.leading(limb.link))
+    low, high = (end[joints] for end in limits_of(robot))
     q = np.tile(sk.home(robot).q, (POSES, 1))
     q[:, joints] = rng.uniform(np.maximum(low, -np.pi), np.minimum(high, np.pi), (POSES, len(joints)))
     state = sk.State(np.tile(np.eye(4), (POSES, 1, 1)), q)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -252,20 +253,22 @@ def _legs(
     symmetry: Symmetry,
     R: Array,
 ) -> Legs:
-    left, right = (foot.joints for foot in feet)
-    image = None
-    if [int(symmetry.partner[i]) for i in left] == list(right):
-        mirrored = (
-            skeleton.s[list(left)] - 2 * (skeleton.s[list(left)] @ symmetry.normal)[:, None] * symmetry.normal
-        )
-        image = -np.sign((mirrored * skeleton.s[list(right)]).sum(axis=1))
-        image = np.where(skeleton.turns[list(left)], image, -image)
+    several = Counter(i for limb in robot.limbs for i in robot.leading(limb.link))
+    above = robot.leading(robot.tree[feet[0].joints[0]].parent)
+    shared = frozenset((*above, *(i for i, limbs in several.items() if limbs > 1)))
+    ways = [dict.fromkeys(robot.gears[k][0] for k in foot.joints) for foot in feet]
+    left, right = ([i for i in way if i not in shared] for way in ways)
+    image, own = None, {*feet[0].joints}
+    if own.issuperset(left) and [int(symmetry.partner[i]) for i in left] == right:
+        mirrored = skeleton.s[left] - 2 * (skeleton.s[left] @ symmetry.normal)[:, None] * symmetry.normal
+        image = -np.sign((mirrored * skeleton.s[right]).sum(axis=1))
+        image = np.where(skeleton.turns[left], image, -image)
     return Legs(
         robot=robot,
         image=image,
         middle=footing[0].middle,
-        hip=float((R @ root_of(skeleton, left[0]))[2]),
+        hip=float((R @ root_of(skeleton, feet[0].joints[0]))[2]),
         ankle=footing[0].ankle,
         points=footing[0].kind == "point",
-        shared=len(robot.path_to(robot.tree[left[0]].parent)),
+        shared=shared,
     )

@@ -7,7 +7,7 @@ begins from its image.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -19,7 +19,7 @@ from screwkin.algebra.se3 import IDENTITY, as_array
 from screwkin.errors import NoSolutionError
 from screwkin.kinematics.body import center_of_mass
 from screwkin.kinematics.serial_chain import SerialChain, residual
-from screwkin.model.robot import Joint, Posture, Robot
+from screwkin.model.robot import Posture, Robot
 
 BEND = (0.94, 0.96, 0.98, 0.99)
 """Distance of hip and ankle by the greatest one: knees of two equal bones are bent by 40 degrees; by less
@@ -34,6 +34,8 @@ ROUNDS = 12
 """Steps in which the feet are put below the CoM, which moves with them: each leaves a tenth or so."""
 BENDS = (0.3, 0.8, 1.4)
 """Half the bend of the knees in the postures that solutions start from [rad]."""
+ACROSS = 0.8
+"""Component along y of axes that count as those of hip, knee and ankle."""
 ARRIVED = 1e-9
 """Residual [rad, and lengths by the leg's size] at which a sole is where it should be."""
 PARTS = ((0, 1, 2, 3, 4, 5), (0, 1, 3, 4, 5), (0, 1, 3, 5), (3, 4, 5), (3, 5))
@@ -66,14 +68,13 @@ class Legs:
 
     Attributes:
         robot: with legs named ``left_leg`` and ``right_leg``; x forward, z up, plane of symmetry along xz.
-        image: for every joint of the left leg, in the order of its chain, the sign of the right one's
-            position in the mirrored posture; None where the legs' chains differ.
+        image: for every joint that leads the left leg, in the order of its chain, the sign of the right
+            one's position in the mirrored posture; None where the legs' chains differ.
         middle: (2,) the middle of the left sole, from its tip, x forward and y left [m].
         hip: height of the left hip above the base origin in the zero pose [m].
         ankle: height of the ankle above the sole [m].
         points: whether the feet are points, so that they have no tilt.
-        shared: number of joints from the base to where the legs part; they rest.
-        held: further joints that rest, counted as in ``Robot.tree``.
+        shared: joints that move both legs, or another limb as well; they rest.
     """
 
     robot: Robot
@@ -82,8 +83,7 @@ class Legs:
     hip: float
     ankle: float
     points: bool
-    shared: int
-    held: frozenset[int] = frozenset()
+    shared: frozenset[int]
 
 
 def home_of(legs: Legs, rest: Array) -> Home:
@@ -96,8 +96,6 @@ def home_of(legs: Legs, rest: Array) -> Home:
     Raises:
         NoSolutionError: within their limits, the legs cannot stand with level soles at any height.
     """
-    own = len(rest)
-    legs, rest = _uncoupled(legs, rest)
     robot, side = legs.robot, _Side.of(legs, "left_leg", rest)
     start = side.chain.tip.p
     length = legs.hip - float(start.z) - legs.ankle
@@ -133,28 +131,8 @@ def home_of(legs: Legs, rest: Array) -> Home:
             break
         place[0] = wanted
     whole = _both(legs, rest, q, place, rows)
-    posture = Posture("home", bent - legs.hip, tuple(map(float, whole[:own])))
+    posture = Posture("home", bent - legs.hip, tuple(map(float, whole)))
     return Home(posture, rows, side.knee(q) >= 0, off, height / bent)
-
-
-def _uncoupled(legs: Legs, rest: Array) -> tuple[Legs, Array]:
-    """The legs of a robot whose coupled joints are free, but rest with their leaders; and all positions.
-
-    Joints that follow one another may tie one leg to the other: at rest each leg has its own way to stand.
-    """
-    robot, names = legs.robot, legs.robot.joint_names
-    if not robot.coupled:
-        return legs, rest
-    leaders = [names.index(joint.leader) for joint in robot.coupled]
-    follow = [
-        joint.ratio * rest[leader] + joint.offset
-        for joint, leader in zip(robot.coupled, leaders, strict=True)
-    ]
-    kept = [f.name for f in fields(Joint)]
-    freed = tuple(Joint(**{name: getattr(joint, name) for name in kept}) for joint in robot.coupled)
-    free = replace(robot, joints=(*robot.joints, *freed), coupled=(), postures=(), text="")
-    held = frozenset((*leaders, *range(len(names), len(names) + len(freed))))
-    return replace(legs, robot=free, held=held), np.concatenate([rest, follow])
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,12 +157,12 @@ class _Side:
     @classmethod
     def of(cls, legs: Legs, limb: str, rest: Array) -> _Side:
         """The joints that the legs share rest."""
-        chain = SerialChain.of(legs.robot, limb)
+        chain = SerialChain.of(legs.robot, limb, coupled=True)
         own = list(chain.joints)
         low, high = (np.clip(end, -np.pi, np.pi) for end in (chain.lower, chain.upper))
         room = ROOM * (high - low)
         low, high, at_rest = low + room, high - room, rest[own]
-        resting = [k for k, i in enumerate(own) if k < legs.shared or i in legs.held]
+        resting = [k for k, i in enumerate(own) if i in legs.shared]
         low[resting] = high[resting] = at_rest[resting]
         return cls(chain, own, low, high, at_rest)
 
@@ -218,22 +196,23 @@ class _Side:
     @cached_property
     def starts(self) -> Array:
         """Postures (k, n) near the resting one: hip, knee and ankle bent to either side."""
-        s = np.array([as_array(screw.s) for screw in self.chain.screws], dtype=float)
-        across = [i for i in range(len(s)) if abs(s[i, 1]) > 0.8 and self.chain.turning[i]]
-        starts = [self.rest]
+        gears = self.chain.gears or [(k, 1.0, 0.0) for k in range(len(self.own))]
+        senses: dict[int, float] = {}
+        for screw, (k, ratio, _) in zip(self.chain.screws, gears, strict=True):
+            if not screw.is_translation and abs(float(screw.s.y)) > ACROSS:
+                senses.setdefault(k, float(np.sign(float(screw.s.y) * ratio)))
+        across, starts = list(senses), [self.rest]
         for bend in (*BENDS, *(-b for b in BENDS)) if len(across) > 1 else ():
             q = self.rest.copy()
-            q[across[0]] -= bend * np.sign(s[across[0], 1])
-            q[across[1]] += 2 * bend * np.sign(s[across[1], 1])
-            if len(across) > 2:
-                q[across[-1]] -= bend * np.sign(s[across[-1], 1])
+            for k, turn in zip((across[0], across[1], *across[2:][-1:]), (-1, 2, -1), strict=False):
+                q[k] += turn * bend * senses[k]
             starts.append(q)
         return np.array(starts)
 
     def knee(self, q: Array) -> float:
         """How far the axis furthest from the line of first and last one is ahead of it, by the leg's size."""
         D, points = IDENTITY, []
-        for screw, theta in zip(self.chain.screws, q, strict=True):
+        for screw, theta in zip(self.chain.screws, self.chain.thetas(q.tolist()), strict=True):
             points.append(as_array(D @ screw.s0).astype(float))
             D = D @ displacement(screw, float(theta))
         hip, line = points[0], points[-1] - points[0]
@@ -250,7 +229,9 @@ def _both(legs: Legs, rest: Array, q: Array, place: Array, rows: tuple[int, ...]
     whole[left.own] = q
     whole[right.own], starts = right.rest, right.starts
     if legs.image is not None:
-        whole[right.own[legs.shared :]] = legs.image * q[legs.shared :]
+        whole[[i for i in right.own if i not in legs.shared]] = legs.image * [
+            x for i, x in zip(left.own, q, strict=True) if i not in legs.shared
+        ]
         starts = whole[right.own][None]
     there = np.array([place[0], float(right.chain.tip.p.y), place[2]])
     found = right.solved(there[None], rows, starts)

@@ -140,14 +140,10 @@ def _moving(robot: Robot, at_rest: tuple[str, ...]) -> Parts:
 
 
 def _chosen(robot: Robot, limb: Limb, home: Array) -> tuple[int, ...]:
-    """Indices of a limb's joints that move, from the base on."""
-    others = {i for other in robot.limbs if other.name != limb.name for i in robot.path_to(other.link)}
-    # What leads a coupled joint of any limb rests: to move it would move the limb twice.
-    others |= {
-        robot.gears[k][0] for one in robot.limbs for k in robot.path_to(one.link) if k >= len(robot.joints)
-    }
+    """Indices of a limb's joints that move, from the base on; of coupled ones those that lead."""
+    others = {i for other in robot.limbs if other.name != limb.name for i in robot.leading(other.link)}
     others |= {i for one in linkages(robot) for i in one.path if i not in one.imposed}  # they follow
-    own = [i for i in robot.path_to(limb.link) if i < len(robot.joints) and i not in others]
+    own = [i for i in robot.leading(limb.link) if i not in others]
     if limb.kind == "leg":
         count = min(POSE, len(own))
     else:
@@ -178,9 +174,14 @@ def _best(robot: Robot, limb: Limb, own: Sequence[int], count: int, home: Array)
     for offset in offsets:
         thetas = list(start + offset)
         tip = successive_displacement(screws, thetas, A_ref_k=limb.frame).p
-        columns = [as_array(at(tip, column)).astype(float)[rows] for column in chain_jacobian(screws, thetas)]
+        columns = dict.fromkeys(own, np.zeros(count))
+        for k, column in zip(path, chain_jacobian(screws, thetas), strict=True):
+            leader, ratio = robot.gears[k]
+            if leader in columns:
+                twist = as_array(at(tip, column)).astype(float)
+                columns[leader] = columns[leader] + float(ratio) * twist[rows]
         for choice in total:
-            scaled = [room[i] * columns[path.index(i)] for i in choice]
+            scaled = [room[i] * columns[i] for i in choice]
             total[choice] += abs(np.linalg.det(np.stack(scaled)))
     best = max(total.values())
     return next(choice for choice, volume in total.items() if volume >= _GOOD * best)

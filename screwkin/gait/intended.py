@@ -33,7 +33,7 @@ def intended(robot: Robot, trajectory: Trajectory) -> Trajectory:
     moving, targets = drive.moving, {"base": trajectory.T_world_base}
     for limb in moving.limbs:
         pose = drive.upright(limb.tip, trajectory.T_world_tip[limb.tip])
-        whole = limb.tip in trajectory.feet or len(moving.path_to(limb.link)) >= POSE
+        whole = limb.tip in trajectory.feet or len(moving.leading(limb.link)) >= POSE
         targets[limb.tip] = pose if whole else pose[:, :3, 3]
     guess = State(trajectory.T_world_base, trajectory.q[:, drive.joints])
     solution = solve_pose(moving, targets, guess, free=free_rotations(closed_mechanism(moving)))

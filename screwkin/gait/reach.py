@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
-from screwkin.algebra.screws import at
 from screwkin.algebra.se3 import Pose, as_array, pose_from_array, rotation_log, unstack
 from screwkin.errors import LimitError, UnreachableError
 from screwkin.gait.plan import Plan
@@ -18,13 +17,8 @@ from screwkin.ik.pose import solve_pose
 from screwkin.ik.pose_solution import PoseSolution
 from screwkin.kinematics.landmarks import limb_root, waist_frame
 from screwkin.kinematics.limits import limited_joints
-from screwkin.kinematics.positions import (
-    chain_jacobian,
-    link_displacements,
-    pose_in_base,
-    successive_displacement,
-)
-from screwkin.kinematics.serial_chain import SerialChain
+from screwkin.kinematics.positions import link_displacements, pose_in_base
+from screwkin.kinematics.serial_chain import SerialChain, jacobian
 from screwkin.model.records import LIMIT_TOLERANCE
 from screwkin.model.robot import Limb, Robot
 from screwkin.model.state import State
@@ -61,7 +55,7 @@ def refuse_turns(robot: Robot, plan: Plan, free: Free) -> None:
         turned = np.flatnonzero(np.abs(R[:, 0] * R[0, 1] - R[:, 1] * R[0, 0]) > _MISSING)
         if "rz" in free.get(foot, ()) and len(turned):
             limb, sample = robot.limb(foot), int(turned[0])
-            joints = ", ".join(robot.joints[i].name for i in robot.path_to(limb.link))
+            joints = ", ".join(robot.joints[i].name for i in robot.leading(limb.link))
             when = f"{limb.name}, sample {sample} (t = {float(plan.time[sample]):.3f} s)"
             missing = f"no joint of {limb.name} ({joints}) turns {foot} about the vertical"
             advice = f"straight and sideways walks do not; set turn = 0 (now {plan.gait.turn:.3g} rad)"
@@ -112,19 +106,16 @@ def on_other_branch(
         limb: one of the robot's.
         free: rotations of tips that follow.
     """
-    path, target = list(robot.path_to(limb.link)), targets.get(limb.tip)
+    own, target = list(robot.leading(limb.link)), targets.get(limb.tip)
     q = np.reshape(solution.state.q, (-1, len(robot.joints)))
     posed = target is not None and target.shape[-2:] == (4, 4)
-    chain = SerialChain.of(robot, limb.name, free.get(limb.tip, ()) if posed else ())
+    chain = SerialChain.of(robot, limb.name, free.get(limb.tip, ()) if posed else (), coupled=True)
     if target is None or len(chain.joints) != (6 if posed else 3):
         return np.zeros(len(q), dtype=bool)
     q = np.concatenate([np.array(robot.posture("home").q, dtype=float)[None], q])
-    virtual = np.zeros((len(q), len(chain.joints) - len(path)))
-    screws, thetas = [robot.joints[i].screw for i in path], unstack(np.hstack([q[:, path], virtual]))
-    screws += chain.screws[len(path) :]
-    tip = successive_displacement(screws, thetas, A_ref_k=limb.frame).p
-    columns = [as_array(at(tip, column), (len(q),)) for column in chain_jacobian(screws, thetas)]
-    sense = np.linalg.det(np.stack(columns, axis=-1)[:, slice(0 if posed else 3, 6)])
+    virtual = np.zeros((len(q), len(chain.joints) - len(own)))
+    _, J = jacobian(chain, np.hstack([q[:, own], virtual]))
+    sense = np.linalg.det(J[:, slice(0 if posed else 3, 6)])
     judged = abs(sense[0]) >= _MISSING * np.abs(sense).max()
     return np.asarray((sense[1:] * sense[0] < 0) & judged)
 
@@ -140,7 +131,7 @@ def _refuse_other_branch(
     other = np.flatnonzero(on_other_branch(robot, targets, solution, limb, free))
     if not len(other):
         return
-    path = [*robot.path_to(limb.link), *beside(robot, limb.name)]
+    path = [*robot.leading(limb.link), *beside(robot, limb.name)]
     start = np.array(robot.posture("home").q, dtype=float)
     sample, joints, endless = int(other[0]), limited_joints(robot), np.inf
     one = {name: target[sample] for name, target in targets.items()}
@@ -178,19 +169,17 @@ def _missing_freedom(
 
     Rotations of the tip that ``follow`` are not asked for.
     """
-    path = robot.path_to(limb.link)
     if target.shape != (4, 4):
         return ""
-    screws, home = [robot.joints[i].screw for i in path], [robot.posture("home").q[i] for i in path]
-    waist = waist_frame(robot)
-    tip = successive_displacement(screws, home, A_ref_k=limb.frame)
-    length = max(float(np.linalg.norm(as_array(tip.p - limb_root(robot, limb.name)).astype(float))), 1e-3)
+    own, waist = list(robot.leading(limb.link)), waist_frame(robot)
+    chain = SerialChain.of(robot, limb.name, tuple(follow), coupled=True)
+    home = np.array(robot.posture("home").q, dtype=float)[own]
+    tip, J = jacobian(chain, np.append(home, np.zeros(len(follow)))[None])
+    place = np.ravel(as_array(tip.p, (1,)))
+    length = max(float(np.linalg.norm(place - as_array(limb_root(robot, limb.name)).astype(float))), 1e-3)
     axes = np.kron(np.eye(2), as_array(waist.R).astype(float).T)
     weight = np.repeat([1.0, 1 / length], 3)
-    columns = [as_array(at(tip.p, column)).astype(float) for column in chain_jacobian(screws, home)]
-    turned = as_array(tip.R).astype(float)
-    columns += [np.append(turned[:, "xyz".index(name[1])], np.zeros(3)) for name in follow]
-    J = weight[:, None] * (axes @ np.stack(columns, axis=1))
+    J = weight[:, None] * (axes @ J[0])
     U, values, _ = np.linalg.svd(J)
     free = U[:, int((values > _MISSING * values[0]).sum()) :]
     residual = weight * _residual(robot, limb, target, solution, sample, waist)
@@ -198,7 +187,7 @@ def _missing_freedom(
     if not np.linalg.norm(asked) > 0.5 * np.linalg.norm(residual):
         return ""
     verb, how = _FREEDOMS[int(np.abs(free @ asked).argmax())]
-    joints = ", ".join(robot.joints[i].name for i in path)
+    joints = ", ".join(robot.joints[i].name for i in own)
     return f"no joint of {limb.name} ({joints}) {verb} {limb.tip} {how}, as the gait asks"
 
 

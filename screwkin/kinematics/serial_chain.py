@@ -327,10 +327,9 @@ def miss(chain: SerialChain, q: Sequence[Scalar], target: Pose | Vector) -> Scal
 
 
 def volume(chain: SerialChain, q: Array) -> Array:
-    """(B,) size of the determinant of six joints' screws at q (B, 6), velocities over the limb's size."""
-    tip, columns = forward(chain.screws, unstack(q), chain.tip)
-    J = as_array([at(tip.p, column) for column in columns], (len(q),)).astype(float)
-    J[..., 3:] /= chain.length
+    """(B,) size of the determinant of six joints' columns at q (B, 6), velocities over the limb's size."""
+    J = jacobian(chain, q)[1]
+    J[:, 3:] /= chain.length
     return np.asarray(np.abs(np.linalg.det(J)))
 
 
@@ -350,6 +349,14 @@ def target_of(target: Array) -> Pose | Vector:
     return vector_from_array(target) if target.ndim == 2 else pose_from_array(target)
 
 
+def jacobian(chain: SerialChain, q: Array) -> tuple[Pose, Array]:
+    """Pose of the tip at q (B, n), and its Jacobian (B, 6, n) at the tip's origin, of coupled joints too."""
+    thetas, rates = chain.moved(q)
+    tip, columns = forward(chain.screws, thetas, chain.tip)
+    J = as_array([at(tip.p, column) for column in columns], (len(q),)).astype(float).swapaxes(1, 2)
+    return tip, J if rates is None else J @ rates
+
+
 def residual(chain: SerialChain, q: Array, target: Array) -> tuple[Array, Array]:
     """What separates the tip from its target, and how the tip moves.
 
@@ -362,12 +369,8 @@ def residual(chain: SerialChain, q: Array, target: Array) -> tuple[Array, Array]
         residual (B, 6): rotation vector and translation [rad, m] from the tip to the target, base axes;
         Jacobian (B, 6, n), rows [omega; v of the tip's origin]. For positions the last three rows only.
     """
+    tip, J = jacobian(chain, q)
     count = (len(q),)
-    thetas, rates = chain.moved(q)
-    tip, columns = forward(chain.screws, thetas, chain.tip)
-    J = as_array([at(tip.p, column) for column in columns], count).swapaxes(1, 2)
-    if rates is not None:
-        J = J @ rates
     if target.ndim == 2:
         return target - as_array(tip.p, count), J[:, 3:]
     wanted = pose_from_array(target)

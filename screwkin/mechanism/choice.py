@@ -69,7 +69,7 @@ def preference(mechanism: Mechanism) -> list[int]:
     if not mechanism.chains:
         return measuring + real[::-1]
     robot = mechanism.robot
-    users = Counter(i for limb in robot.limbs for i in {robot.gears[k][0] for k in robot.path_to(limb.link)})
+    users = Counter(i for limb in robot.limbs for i in robot.leading(limb.link))
     shared = [column for i, column in enumerate(real) if users[i] > 1]
     own = [column for column in real if column not in shared]
     tips = [chain for chain in mechanism.chains if chain.limb]

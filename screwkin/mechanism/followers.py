@@ -35,7 +35,7 @@ def tip_chain(robot: Robot, limb: str) -> tuple[str, ...]:
     """Couplings of the virtual chain of a limb's tip, those that follow last.
 
     A chain that the table orders otherwise than x, y, z is the user's choice and stays. So does the chain of
-    a limb with any other number of joints than four or five, or with coupled ones.
+    a limb with any other number of joints than four or five; of coupled ones those that lead count.
 
     Args:
         robot: the robot.
@@ -44,12 +44,13 @@ def tip_chain(robot: Robot, limb: str) -> tuple[str, ...]:
     chosen = robot.limb(limb)
     path = robot.path_to(chosen.link)
     numbers = (chosen.frame, *(robot.tree[i].screw for i in path))
-    if chosen.chain != SPATIAL or len(path) not in ORDERS or max(path) >= len(robot.joints):
+    joints = len(robot.leading(chosen.link))
+    if chosen.chain != SPATIAL or joints not in ORDERS:
         return chosen.chain
     if any(True for _ in open_scalars(numbers)):
         return chosen.chain
-    orders = ORDERS[len(path)]
-    volumes = [_volume(robot, limb, order[len(path) - 3 :]) for order in orders]
+    orders = ORDERS[joints]
+    volumes = [_volume(robot, limb, order[joints - 3 :]) for order in orders]
     best = max(volumes)
     order = next(o for o, v in zip(orders, volumes, strict=True) if v >= GOOD * best)
     return (*POSITION, *order)
@@ -63,7 +64,7 @@ def followers(robot: Robot, limb: str) -> tuple[str, ...]:
         limb: name of one of its limbs.
     """
     chain = tip_chain(robot, limb)
-    count = max(len(robot.path_to(robot.limb(limb).link)), len(POSITION))
+    count = max(len(robot.leading(robot.limb(limb).link)), len(POSITION))
     return chain[count:] if len(chain) == len(SPATIAL) else ()
 
 
@@ -72,7 +73,7 @@ def _volume(robot: Robot, limb: str, free: tuple[str, ...]) -> float:
 
     Of the reference posture and of postures around it, one joint at a time: a straight knee decides nothing.
     """
-    chain = SerialChain.of(robot, limb, free)
+    chain = SerialChain.of(robot, limb, free, coupled=True)
     q = np.zeros((2 * len(chain.joints) + 1, len(chain.joints)))
     own = len(chain.joints) - len(free)
     q[:, :own] = np.array(reference_posture(robot), dtype=float)[list(chain.joints[:own])]

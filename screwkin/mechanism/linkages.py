@@ -120,7 +120,7 @@ def motor_joints(robot: Robot) -> tuple[str, ...]:
 
 def crossed_linkages(robot: Robot, limb: str) -> tuple[Linkage, ...]:
     """The linkages through which the way to a limb's tip runs."""
-    way = _way(robot, robot.limb(limb).link)
+    way = robot.leading(robot.limb(limb).link)
     return tuple(linkage for linkage in linkages(robot) if set(way) & set(linkage.joints))
 
 
@@ -132,7 +132,7 @@ def limb_linkages(robot: Robot, limb: str) -> tuple[Linkage, ...]:
     """
     crossed, name = crossed_linkages(robot, limb), robot.limb(limb).name
     for linkage in crossed:
-        others = [one for one in robot.limbs if set(_way(robot, one.link)) & set(linkage.joints)]
+        others = [one for one in robot.limbs if set(robot.leading(one.link)) & set(linkage.joints)]
         if len(others) > 1:
             raise InputError(
                 f"{robot.name} has closures ({linkage.name}) that tie joints of {name} to another limb's, "
@@ -141,13 +141,8 @@ def limb_linkages(robot: Robot, limb: str) -> tuple[Linkage, ...]:
     return crossed
 
 
-def _way(robot: Robot, link: str) -> tuple[int, ...]:
-    """Indices in q of what moves the joints from the base to a link."""
-    return tuple(dict.fromkeys(robot.gears[k][0] for k in robot.path_to(link)))
-
-
 def _linkage(robot: Robot, closures: tuple[Closure, ...], joints: tuple[int, ...]) -> Linkage:
-    ways = {limb.name: _way(robot, limb.link) for limb in robot.limbs}
+    ways = {limb.name: robot.leading(limb.link) for limb in robot.limbs}
     limb = next((name for name, way in ways.items() if set(way) & set(joints)), "")
     path = tuple(i for i in ways.get(limb, ()) if i in joints)
     bodies = {robot.base_link, *(robot.tree[k].child for one in robot.limbs for k in robot.path_to(one.link))}

@@ -240,6 +240,10 @@ class Robot(RobotRecord):
             link = self.tree[i].parent
         return tuple(reversed(path))
 
+    def leading(self, link: str) -> tuple[int, ...]:
+        """Indices in q of what moves the joints from the base to a link, in that order, each once."""
+        return tuple(dict.fromkeys(self.gears[k][0] for k in self.path_to(link)))
+
     @cached_property
     def loops(self) -> tuple[Closure, ...]:
         """Closures between two links: they tie joints to one another, wherever the base is."""

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 from math import pi
 
 AXES = {"yaw": (0, 0, 1), "roll": (1, 0, 0), "pitch": (0, 1, 0)}
-HEIGHTS = {"hip": 0.0, "knee": -0.25, "ankle": -0.5, "shoulder": 0.3, "elbow": 0.1, "wrist": -0.05}
+HEIGHTS = {"hip": 0.0, "knee": -0.25, "shin": -0.28, "ankle": -0.5}
+HEIGHTS |= {"shoulder": 0.3, "elbow": 0.1, "wrist": -0.05}
 SOLE = -0.55
 HIP_Y, SHOULDER_Y = 0.08, 0.16
 LEG = ("hip_yaw", "hip_roll", "hip_pitch", "knee_pitch", "ankle_pitch", "ankle_roll")
