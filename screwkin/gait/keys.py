@@ -68,9 +68,11 @@ _CHOICES = {
         "links",
     ),
     "lateral": _choice(
-        "whether the waist shifts to the side or leans between the hips, as legs without ankle roll need it",
+        "whether the waist shifts to the side, leans between the hips, as legs without ankle roll need it, or"
+        " does both: tilts about a line below them",
         "shift",
         "lean",
+        "tilt",
     ),
     "first": _choice("foot that swings first", "right", "left"),
     "arms": _choice("whether arms follow the path of their hands or rest at home", "follow", "rest"),

@@ -48,7 +48,8 @@ class Gait:
     side); first: the foot that swings first. com: what a preview gait steers, the ``true`` CoM of all links
     or, naively, the ``waist``; model: whose ZMP it leads, a ``cart``'s or that of all ``links``. lateral:
     whether its waist ``shift``s to the side, or ``lean``s between the hips, as legs without a roll axis at
-    the ankle need it to keep their soles flat. twist: share of the way by which the waist turns with each
+    the ankle need it to keep their soles flat, or does both, as it ``tilt``s about a line below the hips, at
+    the number ``pivot`` above the floor. twist: share of the way by which the waist turns with each
     step to where the hips are in line with the feet. swing: spline of a swing; ease: part of an ``even`` one
     in which it speeds up, and again slows down. numbers: all of these and the file's own parameters.
     channels: key points.
@@ -77,7 +78,7 @@ class Gait:
     first: Side
     com: Literal["true", "waist"]
     model: Literal["cart", "links"]
-    lateral: Literal["shift", "lean"]
+    lateral: Literal["shift", "lean", "tilt"]
     arms: Literal["follow", "rest"]
     numbers: Mapping[str, float]
     channels: Mapping[str, Channel]

@@ -2,7 +2,9 @@
 
 A leg without a roll axis at its ankle keeps its sole flat only while it stands upright seen from the front,
 so that a waist that shifts would tilt the soles. Where the waist rolls about the line ahead between the hips,
-these stay above their feet, and what is above them carries the CoM to either side.
+these stay above their feet, and what is above them carries the CoM to either side. Where the line lies
+lower, the waist tilts: it shifts and rolls at once, and a hip carries what is above it on a shorter arm than
+where the waist only shifts.
 """
 
 from __future__ import annotations
@@ -36,13 +38,17 @@ class Steering:
 
         Args:
             robot: with legs and a ``home`` posture.
-            gait: its key ``lateral``.
+            gait: its key ``lateral``, and of a waist that tilts its ``waist_height`` and number ``pivot``.
         """
         if gait.lateral == "shift":
             return cls()
         hips = [as_array(limb_root(robot, limb.name)) for limb in robot.limbs if limb.kind == "leg"]
-        R = as_array(waist_frame(robot).R).astype(float)
-        return cls((R, np.mean(hips, axis=0)))
+        R, middle = as_array(waist_frame(robot).R).astype(float), np.mean(hips, axis=0)
+        if gait.lateral == "tilt":
+            waist, up = as_array(waist_frame(robot).p).astype(float), R[:, 2]
+            height = gait.waist_height + float((middle - waist) @ up)
+            middle = middle - (height - gait.numbers.get("pivot", 0.0)) * up
+        return cls((R, middle))
 
     def moved(self, planned: Plan, by: Array) -> Plan:
         """The plan with its waist, and the hands that hang from it, moved (T, 2); hands do not roll."""

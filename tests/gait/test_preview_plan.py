@@ -140,7 +140,7 @@ def test_feet_side_by_side_at_the_start_and_at_the_end(robot: sk.Robot, gait: sk
         ({"R": 0}, "R: 0 is out of range"),
         ({"Qe": -1}, "Qe: -1 is out of range"),
         ({"com": "torso"}, "Valid: true, waist"),
-        ({"lateral": "sway"}, "Valid: shift, lean"),
+        ({"lateral": "sway"}, "Valid: shift, lean, tilt"),
     ],
 )
 def test_settings_out_of_range_are_refused(

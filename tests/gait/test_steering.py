@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import screwkin as sk
+from screwkin.algebra.se3 import as_array
 from screwkin.anatomy.humanoid import humanoid
 from screwkin.errors import GaitError, NoSolutionError
 from screwkin.gait.feed_forward import walking_torques
@@ -18,6 +19,7 @@ from screwkin.gait.preview import follow_reference, preview_gains
 from screwkin.gait.preview_plan import zmp_reference
 from screwkin.gait.stance import stance_of
 from screwkin.gait.steering import Steering
+from screwkin.kinematics.landmarks import limb_root
 from screwkin.model.urdf_in import parse_urdf
 from tests.anatomy.bodies import biped
 
@@ -58,16 +60,31 @@ def test_rates_and_accelerations_are_those_of_the_rolled_base(
     assert np.ptp(np.arcsin(T[:, 2, 1])) > 0.3
 
 
-def test_points_of_the_roll_s_axis_stay_where_they_are(robot: sk.Robot, gait: sk.Gait) -> None:
+@pytest.mark.parametrize("lateral", ["lean", "tilt"])
+def test_points_of_the_roll_s_axis_stay_where_they_are(robot: sk.Robot, gait: sk.Gait, lateral: str) -> None:
     bioloid = sk.load_robot("bioloid")
     level = plan(fitted(sk.load_gait("turn"), bioloid), stance_of(bioloid), 2)
-    steering = Steering.of(robot, gait)
+    steering = Steering.of(robot, gait.replace(lateral=lateral))
     assert steering.axis is not None
     R, point = steering.axis
     rolled = steering.moved(level, np.linspace(0, 0.4, len(level.time))[:, None] * (0.0, 1.0))
     for at in (point, point + R[:, 0]):
         before, after = (T[:, :3, :3] @ at + T[:, :3, 3] for T in (level.T_world_base, rolled.T_world_base))
         np.testing.assert_allclose(after, before, atol=1e-12)
+
+
+@pytest.mark.parametrize("pivot", [0.0, 0.05, 0.1])
+def test_a_waist_tilts_about_a_line_at_its_height_above_the_floor(pivot: float) -> None:
+    """The middle between the hips goes aside as far as a point turns that lies as high above the line."""
+    bioloid = sk.load_robot("bioloid")
+    gait = fitted(sk.load_gait("auto"), bioloid).replace(lateral="tilt", pivot=pivot)
+    walk, height = sk.walk(bioloid, gait, steps=2), gait.lengths["leg"] * gait.numbers["bend"]
+    angle = np.arcsin(walk.T_world_base[:, 2, 1])
+    legs = [limb.name for limb in bioloid.limbs if limb.kind == "leg"]
+    middle = np.mean([as_array(limb_root(bioloid, leg)).astype(float) for leg in legs], axis=0)
+    assert np.ptp(angle) > 0.05
+    aside = (walk.T_world_base[:, :3, :3] @ middle + walk.T_world_base[:, :3, 3])[:, 1]
+    np.testing.assert_allclose(aside - aside[0], -(height - pivot) * np.sin(angle), atol=2e-3)
 
 
 def test_soles_stay_flat_and_the_zmp_within_them(robot: sk.Robot, gait: sk.Gait) -> None:
@@ -141,9 +158,10 @@ def test_a_waist_that_leans_takes_load_off_the_hips() -> None:
     assert len(rolls) == 2
     most = {
         key: np.abs(walking_torques(bioloid, sk.walk(bioloid, gait.replace(lateral=key), 1)))[:, rolls].max()
-        for key in ("shift", "lean")
+        for key in ("shift", "tilt", "lean")
     }
     assert most["lean"] < 0.9 * most["shift"]
+    assert most["tilt"] < 0.97 * most["shift"]
 
 
 def test_a_leg_whose_sole_may_lean_is_out_of_reach_by_its_limits_not_for_want_of_a_joint(
