@@ -9,11 +9,12 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from importlib import import_module
 from io import TextIOWrapper
 from typing import Any, NoReturn
 
-from screwkin.errors import InputError, ScrewkinError, missing_library, near, one_of
+from screwkin.errors import InputError, OutputError, ScrewkinError, missing_library, near, one_of
 
 VERBS = {
     "demo": "A robot walks: table, mechanism, gait, ZMP, simulation, and a report with pictures.",
@@ -104,8 +105,9 @@ def _run(words: Sequence[str], debug: bool) -> int:
         sys.stdout.flush()
         return code
     except BrokenPipeError:
-        # The reader has gone (as in ``screwkin table … | head``); nothing may be flushed at exit either.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        from screwkin.cli.output import drop_output
+
+        drop_output()  # the reader has gone, as in ``screwkin table … | head``
         return 1
     except Exception as error:
         if debug:
@@ -197,5 +199,6 @@ def _report(error: Exception, words: Sequence[str], debug: bool) -> int:
 
         facts = {"limb": getattr(error, "limb", ""), "sample": getattr(error, "sample", -1)}
         known = {key: value for key, value in facts.items() if value not in ("", -1)}
-        print_json({"error": message, "exit_code": code, **known})
+        with suppress(OutputError):  # the message has been told on stderr
+            print_json({"error": message, "exit_code": code, **known})
     return code

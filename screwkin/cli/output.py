@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from typing import Any, TypeVar
 
 from screwkin.cli.terminal import columns_of, folded, manners, table_lines
-from screwkin.errors import MissingDependencyError, RobotRemark, SpeedRemark
+from screwkin.errors import MissingDependencyError, OutputError, RobotRemark, SpeedRemark
 
 T = TypeVar("T")
 
@@ -22,7 +22,27 @@ LONGEST = 300
 
 def print_json(data: Mapping[str, Any]) -> None:
     """One JSON object on stdout; numbers that JSON does not know (NaN, infinity) become null."""
-    print(json.dumps(plain(data), indent=2, allow_nan=False))
+    _print(json.dumps(plain(data), indent=2, allow_nan=False))
+
+
+def _print(text: str) -> None:
+    """A text on stdout, at once.
+
+    Raises:
+        BrokenPipeError: its reader has gone. OutputError: it cannot be written, as on a full disk.
+    """
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        drop_output()
+        raise OutputError(f"cannot write standard output: {error.strerror}") from None
+
+
+def drop_output() -> None:
+    """Write to nowhere from now on, where stdout has failed: it is flushed once more at exit."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def plain(value: Any) -> Any:
@@ -96,7 +116,7 @@ def say(text: str, folds: bool = True) -> None:
         folds: whether it is folded where the terminal is narrower; not what goes into another document.
     """
     if not manners().quiet:
-        print(folded(text, sys.stdout) if folds else text, flush=True)
+        _print(folded(text, sys.stdout) if folds else text)
 
 
 def aligned(rows: Sequence[Sequence[Any]], indent: str = "") -> str:

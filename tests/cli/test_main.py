@@ -176,6 +176,20 @@ def test_a_reader_that_goes_away_makes_no_noise(tmp_path):
     assert done.stdout.strip() in ("0", "1")
 
 
+@pytest.mark.parametrize("words", ["robots", "robots --json", "table nobody --json", "--help"])
+def test_a_full_disk_under_stdout_is_one_message(tmp_path, words):
+    """A file that may hold no byte stands for the disk; Python begins with the signal for it ignored."""
+    script = f"ulimit -f 0; {sys.executable} -m screwkin {words} > out"
+    environment = {**os.environ, "PYTHONPATH": str(CHECKOUT)}
+    done = subprocess.run(
+        ["bash", "-c", script], env=environment, cwd=tmp_path, capture_output=True, text=True
+    )
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: ")
+    assert done.stderr.count("\n") == 1 + done.stderr.count("\n  ")
+    assert ("cannot write standard output" in done.stderr) == ("nobody" not in words)
+
+
 def test_the_module_and_the_entry_point_are_the_same_command(tmp_path):
     done = command("robots", "--json", cwd=tmp_path)
     assert done.returncode == 0
