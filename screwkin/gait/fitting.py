@@ -5,8 +5,8 @@ The search begins with steps of a usual pace, from large ones on bent legs to sm
 slower and quicker ones, and what spares weak or stiff joints. Of those a small step is tried first; larger
 ones follow where it will do. Sizes are tried coarsely in one batch; promising ones are planned in full and
 judged by the model alone. A gait that uses at most ``SPARED`` of every torque ends the search; else
-``MORE_JUDGED`` are judged after the first that will do, and the one that uses least is taken: landings add to
-what the motion needs, and so do legs that push against each other while both feet stand.
+``MORE_PACES`` follow after the first that has one that will do, and of all the one that uses least is taken:
+landings add to what the motion needs, and so do legs that push against each other while both feet stand.
 """
 
 from __future__ import annotations
@@ -32,13 +32,17 @@ USE = 0.9
 """Share of a joint's speed and torque that a gait may take."""
 SPARED = 0.7
 """Share of every torque with which the search ends at once."""
-MORE_JUDGED = 4
-"""Gaits judged after the first that will do, for one that uses less torque."""
+MORE_PACES = 3
+"""Paces with gaits that will do, after the first such pace, that are tried for one that uses less torque."""
+NEARLY = 0.02
+"""Shares of torque that differ by less are alike: the gait that was tried first is taken."""
+LASTING = 0.05
+"""How long torques last by which gaits are compared [s]: as long as a verdict's."""
 HEIGHTS_JUDGED = 3
 """Of a size, heights of the hips that are judged: the next one where there is no walk at the one before."""
 OUTSIDE = "the ZMP comes"
 """How a reason of a ZMP outside the support polygon begins."""
-_STEPS = 3
+_STEPS = 4  # the default of 6 also ends with the other foot than it begins with
 _SPREAD = 2.0  # leg lengths: radii of gyration beyond it are in other units
 
 
@@ -46,7 +50,7 @@ _SPREAD = 2.0  # leg lengths: radii of gyration beyond it are in other units
 class _Judged:
     """A gait planned in full and why it will not do, empty if it does.
 
-    use: greatest share of a joint's torque; cut_short: there is no such walk.
+    use: greatest share of a joint's torque that lasts; cut_short: there is no such walk.
     """
 
     gait: Gait
@@ -75,29 +79,36 @@ def fitting_gait(robot: Robot) -> Gait:
         True
     """
     expect(robot, Robot, "robot", 'load_robot("NAME")')
-    base, tried, since = usual_pace(robot), list[_Judged](), 0
-    for judged in _tries(robot, base):
-        tried.append(judged)
-        if judged.use <= SPARED and not judged.reasons:
-            return judged.gait
-        since += any(not one.reasons for one in tried)
-        if since > MORE_JUDGED:
+    base, tried, paces = usual_pace(robot), list[_Judged](), 0
+    for pace in _paces(robot, base):
+        since = len(tried)
+        for judged in pace:
+            tried.append(judged)
+            if judged.use <= SPARED and not judged.reasons:
+                return judged.gait
+        paces += any(not one.reasons for one in tried[since:])
+        if paces > MORE_PACES:
             break
     will_do = [one for one in tried if not one.reasons]
     if will_do:
-        return min(will_do, key=lambda one: one.use).gait
+        least = min(one.use for one in will_do)
+        return next(one.gait for one in will_do if one.use <= least + NEARLY)
     raise NoSolutionError(_refusal(robot, base, tried))
 
 
-def _tries(robot: Robot, base: Gait) -> Iterator[_Judged]:
-    """Gaits judged in full, in the order in which they are to be preferred."""
-    yield from _of_sizes(robot, base, STEP_SIZES)
+def _paces(robot: Robot, base: Gait) -> Iterator[Iterator[_Judged]]:
+    """Of every pace gaits judged in full, both in the order in which they are to be preferred."""
+    yield _of_sizes(robot, base, STEP_SIZES)
+    yield from (_from_small(robot, paced) for paced in other_paces(robot, base))
+
+
+def _from_small(robot: Robot, paced: Gait) -> Iterator[_Judged]:
+    """The smallest step judged, and before it larger ones where it will do."""
     *larger, smallest = STEP_SIZES
-    for paced in other_paces(robot, base):
-        small = list(_of_sizes(robot, paced, [smallest]))
-        if any(not one.reasons for one in small):
-            yield from _of_sizes(robot, paced, larger)
-        yield from small
+    small = list(_of_sizes(robot, paced, [smallest]))
+    if any(not one.reasons for one in small):
+        yield from _of_sizes(robot, paced, larger)
+    yield from small
 
 
 def _of_sizes(robot: Robot, paced: Gait, sizes: Sequence[StepSize]) -> Iterator[_Judged]:
@@ -138,9 +149,16 @@ def _judged(robot: Robot, gait: Gait) -> _Judged:
         trajectory = planned_walk(robot, gait, _STEPS)
     except ScrewkinError as error:
         return _Judged(gait, (str(error),), cut_short=True)
-    torques = np.abs(walking_torques(robot, trajectory)).max(axis=0)
-    reasons = *_unbalanced(trajectory), *_overloaded(robot, trajectory, torques)
-    return _Judged(gait, reasons, float(np.max(torques / [joint.effort for joint in robot.joints])))
+    torques = walking_torques(robot, trajectory)
+    reasons = *_unbalanced(trajectory), *_overloaded(robot, trajectory, np.abs(torques).max(axis=0))
+    lasting = np.abs(_means(torques, round(LASTING * gait.rate))).max(axis=0)
+    return _Judged(gait, reasons, float(np.max(lasting / [joint.effort for joint in robot.joints])))
+
+
+def _means(values: Array, count: int) -> Array:
+    """Means over all windows of consecutive rows; of all rows where there are fewer."""
+    windows = np.lib.stride_tricks.sliding_window_view(values, min(max(count, 1), len(values)), axis=0)
+    return np.asarray(windows.mean(axis=-1))
 
 
 def _unbalanced(trajectory: Trajectory) -> Iterator[str]:

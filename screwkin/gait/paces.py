@@ -8,8 +8,11 @@ shifts would tilt their soles. Where the usual pace will not do, these follow:
 - slower steps, for quick joints, and quicker ones, which need less sway;
 - quick steps whose ZMP keeps to the inner half of the sole, then with the feet apart, for hips that turn in
   little;
-- a waist that leans over the foot that stands: a hip carries all but its leg beside it, by the distance that
-  its CoM keeps from the hip, and only a lean makes that shorter;
+- a waist that tilts, then with the feet apart, or leans over the foot that stands: a hip carries all but its
+  leg beside it, by the distance that its CoM keeps from the hip, and only a lean makes that shorter; where
+  the waist also shifts, as it does when it tilts about a line below the hips, less of a lean is needed, and
+  the step may take its time;
+- quick steps whose ZMP keeps beside the ankles, for hips that bend little: these are then further back;
 - steps so slow that the weight is shifted while both feet stand, for joints that are slow.
 """
 
@@ -41,6 +44,8 @@ PERIODS = (3.5, 4.5, 6.0)
 """Of a step, in periods of a pendulum as long as the legs over 2 pi."""
 LEANING = (2.0, 1.5, 1.0)
 """Likewise, of steps with a waist that leans."""
+TILTING = (3.5, 4.5)
+"""Likewise, of steps with a waist that tilts."""
 QUICK_PERIODS = (2.5, 2.0)
 """Likewise, of steps that need less sway, where joints of hips or ankles cannot turn far enough for it."""
 SLOW_PERIODS = (8.0, 14.0)
@@ -53,6 +58,8 @@ INWARD = 0.5
 """How far from the middle of the sole to its inner edge the ZMP goes, where hips turn in too little."""
 WIDER = 0.05
 """How much further each foot then stands from the middle, in leg lengths."""
+PIVOT = 0.5
+"""Height of the line about which a waist tilts, in leg lengths."""
 SOLE_GAP = 0.02
 """Least gap between the feet, in leg lengths."""
 STANDING_SHARE = 0.3
@@ -122,7 +129,12 @@ def other_paces(robot: Robot, usual: Gait) -> Iterator[Gait]:
     yield from (_quick(inward, period) for period in QUICK_PERIODS)
     wide = f"{_spread(robot, usual) + WIDER:.4g}*leg"
     yield from (_quick(inward.replace(spread=wide), period) for period in QUICK_PERIODS)
+    tilting = upright.replace(lateral="tilt", pivot=f"{PIVOT:g}*leg")
+    yield from (tilting.replace(period=period) for period in TILTING)
+    yield tilting.replace(spread=f"{_spread(robot, usual) + 2 * WIDER:.4g}*leg")
     yield from (_leaning(upright, period) for period in LEANING)
+    if usual.numbers["ahead"] > 0:
+        yield _quick(upright.replace(ahead=0), QUICK_PERIODS[0])
     yield from (upright.replace(period=period, dsp=SHIFTED) for period in SLOW_PERIODS)
 
 

@@ -49,6 +49,18 @@ def test_slower_joints_get_a_slower_gait(robot, gait):
 
 
 @pytest.mark.slow
+def test_hips_that_are_weak_sideways_get_a_waist_that_tilts(robot, gait):
+    """However slow or quick the steps, a waist that only shifts asks for more."""
+    rolls = [name for name in robot.joint_names if "hip_roll" in name]
+    weak = robot.replace(effort=dict.fromkeys(rolls, 0.7))
+    assert gait.lateral == "shift"
+    fitted = fitting_gait(weak)
+    assert fitted.lateral == "tilt"
+    torque = np.abs(walking_torques(weak, sk.walk(weak, fitted, 6))).max(axis=0)
+    assert torque[[robot.joint_names.index(name) for name in rolls]].max() <= USE * 0.7
+
+
+@pytest.mark.slow
 def test_a_robot_too_weak_for_any_gait_is_told_which_joint_and_by_how_much(robot):
     weak = robot.replace(effort={joint.name: 0.02 for joint in robot.joints if "left" not in joint.name})
     with pytest.raises(NoSolutionError, match=r"no gait fits; with .*knee needs [\d.]+ of 0\.02 N m"):
