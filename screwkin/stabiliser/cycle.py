@@ -221,7 +221,8 @@ def cycle(
     dcm = pair_turned(pair_difference(pair_sum(memory.com, _pair(rate), 1.0 / w), origin), -yaw)
     beside = pair_turned(pair_difference(_pair(memory.other), origin), -yaw)
     stood = pair_turned(pair_difference(memory.zmp, origin), -yaw)
-    decided = step_landing(rhythm, gains, memory, dcm, stood, [step[:2] for step in ahead.steps], feedback)
+    steps = [step[:2] for step in ahead.steps]
+    decided = step_landing(rhythm, gains, memory, dcm, stood, steps, ahead.more, feedback)
     now = _now(rhythm, memory, decided, starting, stepping, ahead)
     there = pair_sum(
         now.place_before, pair_turned((rhythm.under[0], now.side * rhythm.under[1]), ahead.steps[0][2])
@@ -229,9 +230,12 @@ def cycle(
     shift = first_shift(rhythm, memory, dcm, beside, ahead.steps[0][:2])
     under = rhythm.under[0], memory.side * rhythm.under[1]
     begins = starting & (now.mode > 0.5)
-    at_rest = either(begins, under, either(starting, shift, stopping_zmp(rhythm, dcm, beside)))
+    at_rest = either(
+        begins, under, either(starting, shift, stopping_zmp(rhythm, memory.tau, dcm, stood, beside))
+    )
     zmp = either(stepping, either(now.lands, there, decided.zmp), at_rest)
-    ease = where(stepping | begins, dt / larger(rhythm.both - now.tau, dt), where(starting, 1.0, 0.3))
+    evenly = dt / larger(rhythm.both - now.tau, dt)
+    ease = where(stepping | begins, evenly, where(starting, 1.0, where(now.tau < rhythm.both, evenly, 0.3)))
     zmp = pair_sum(
         memory.zmp, pair_difference(pair_sum(origin, pair_turned(_pair(zmp), yaw)), memory.zmp), ease
     )

@@ -108,6 +108,7 @@ class Rhythm:
     the middle to a foot [m]; half: half edges of the sole, and middle: of the sole ahead of the tip and
     outwards [m]; beginning: from rest to the first step [s]; dt: of a cycle [s].
     inward: from there to where the ZMP of a step stands: out over the edge is no way back [m].
+    rest: where the CoM rests after the last step, ahead and to the left of the middle between the tips [m].
     """
 
     period: Scalar
@@ -120,6 +121,7 @@ class Rhythm:
     beginning: Scalar = 0.8
     dt: Scalar = 0.01
     inward: Scalar = 0.0
+    rest: Pair = (0.0, 0.0)
 
     @property
     def w(self) -> Scalar:
@@ -218,6 +220,7 @@ def step_landing(
     dcm: Pair,
     zmp: Pair,
     steps: Sequence[Sequence[Scalar]],
+    more: Scalar,
     feedback: Scalar,
 ) -> Landing:
     """ZMP, landing place and time of a step in course.
@@ -229,17 +232,15 @@ def step_landing(
         dcm: beside the stance foot's tip, in its axes.
         zmp: of the cycle before, likewise.
         steps: displacements (forward, left) of this step and of the next.
+        more: how many follow; the last one ends as rest between the feet needs it.
         feedback: 0 leaves place and time as planned.
     """
     w, dt = rhythm.w, rhythm.dt
     side, tau = course.side, course.tau
     (cx, cy), (hx, hy) = rhythm.under, rhythm.half
-    here, there = (cx, side * cy), (cx, -side * cy)
+    here = cx, side * cy
     nominal = nominal_place(rhythm, side, steps[0])
-    next_zmp = pair_sum(nominal, there)
-    # The DCM as the step ends, had the ZMP stayed at the tip; it needs late of it more or less.
-    goal = pair_sum(next_zmp, entry(rhythm, -side, next_zmp, steps[1]))
-    late = delay(rhythm, rhythm.both)
+    late, goal = delay(rhythm, rhythm.both), _goal(rhythm, side, nominal, steps[1], more)
     left = larger(course.period - tau, dt)
     growth = exponential(w * left)
     ramp = growth * delay(rhythm, clipped(rhythm.both - tau, 0.0, rhythm.both))
@@ -274,6 +275,19 @@ def step_landing(
     still = share >= LATE
     chosen = where(still, course.place[0], moved[0]), where(still, course.place[1], moved[1])
     return Landing(aim, chosen, period, held)
+
+
+def _goal(rhythm: Rhythm, side: Scalar, nominal: Pair, step: Sequence[Scalar], more: Scalar) -> Pair:
+    """The DCM at the end of a step that lands as planned, had the ZMP stayed at the tip.
+
+    More steps follow as ``entry`` says, or the ZMP then goes evenly to where the CoM rests.
+    """
+    foot = pair_sum(nominal, (rhythm.under[0], -side * rhythm.under[1]))
+    onwards = pair_sum(foot, entry(rhythm, -side, foot, step))
+    rest = pair_sum(rhythm.rest, nominal, 0.5)
+    stays = pair_sum(rest, rest, -delay(rhythm, rhythm.both))
+    last = more < 0.5
+    return where(last, stays[0], onwards[0]), where(last, stays[1], onwards[1])
 
 
 def _timed(
@@ -323,10 +337,27 @@ def first_shift(rhythm: Rhythm, course: StepState, dcm: Pair, beside: Pair, step
     return _between(rhythm, (zmp[0], zmp[1]), beside)
 
 
-def stopping_zmp(rhythm: Rhythm, dcm: Pair, beside: Pair) -> Pair:
-    """ZMP that brings the DCM to rest between the feet, within both soles."""
-    middle = 0.5 * beside[0] + rhythm.middle[0], 0.5 * beside[1]
-    return _between(rhythm, pair_sum(middle, pair_difference(dcm, middle), 1.5), beside)
+def stopping_zmp(rhythm: Rhythm, tau: Scalar, dcm: Pair, zmp: Pair, beside: Pair) -> Pair:
+    """ZMP that brings the DCM to rest between the feet, within both soles.
+
+    It goes there evenly while both feet would stand in a step, and then stands half as far again from the
+    point of rest as the DCM.
+
+    Args:
+        rhythm: what is constant.
+        tau: since the last foot landed [s].
+        dcm: in the axes of that foot.
+        zmp: of the cycle before, likewise.
+        beside: the other foot, likewise.
+    """
+    rest, left = pair_sum(rhythm.rest, beside, 0.5), larger(rhythm.both - tau, 0.0)
+    growth = exponential(rhythm.w * left)
+    ramp = growth * delay(rhythm, left)
+    share = 1.5 / (1.0 - 1.5 * (1.0 - growth + ramp))
+    ahead, aside = (
+        share * (growth * (x - r) - ramp * (z - r)) for x, z, r in zip(dcm, zmp, rest, strict=True)
+    )
+    return _between(rhythm, pair_sum(rest, (ahead, aside)), beside)
 
 
 def _between(rhythm: Rhythm, zmp: Pair, beside: Pair) -> Pair:

@@ -107,7 +107,16 @@ def rhythm_of(plan: Trajectory, tips: tuple[str, str], swings: list[Swing], sole
         beginning=beginning,
         dt=CYCLE,
         inward=_INWARD * float(half[1]),
+        rest=_rest(plan, tips),
     )
+
+
+def _rest(plan: Trajectory, tips: tuple[str, str]) -> tuple[float, float]:
+    """Where the CoM rests at the end of a plan, beside the middle between the feet, in their heading [m]."""
+    right, left = (_place(plan, tip, -1) for tip in tips)
+    x, y = plan.com[-1, :2] - 0.5 * (right + left)[:2]
+    c, s = np.cos(left[2]), np.sin(left[2])
+    return float(c * x + s * y), float(c * y - s * x)
 
 
 def steps_of(plan: Trajectory, tips: tuple[str, str], rhythm: Rhythm, swings: list[Swing]) -> Array:

@@ -93,7 +93,7 @@ def test_even_steps_are_a_fixed_point_of_the_law(
             xi = tuple(c + v / rhythm.w - o for c, v, o in zip(com, rate, origin, strict=True))
             here = tuple(z - o for z, o in zip(zmp, origin, strict=True))
             course = _Course(tau, period, side, held, place)
-            decided = law.step_landing(rhythm, Gains(), course, xi, here, steps, 0.0)  # type: ignore[arg-type]
+            decided = law.step_landing(rhythm, Gains(), course, xi, here, steps, 1.0, 0.0)  # type: ignore[arg-type]
             held = decided.held
             assert decided.period == period
             np.testing.assert_allclose(decided.place, (ahead, aside - side * 0.084), atol=1e-12)
@@ -109,6 +109,43 @@ def test_even_steps_are_a_fixed_point_of_the_law(
     np.testing.assert_allclose(far, 0.0, atol=1e-3)
 
 
+@settings(max_examples=20)
+@given(
+    period=st.floats(0.3, 2.0), height=st.floats(0.12, 0.3), ahead=st.floats(0.0, 0.06),
+    rest=st.tuples(st.floats(-0.02, 0.02), st.floats(-0.01, 0.01)), side=st.sampled_from([1.0, -1.0]),
+)  # fmt: skip
+def test_the_last_step_ends_at_rest(
+    period: float, height: float, ahead: float, rest: tuple[float, float], side: float
+) -> None:
+    """From the orbit of even steps straight to where the CoM shall rest, which may lie beside the middle."""
+    period = CYCLE * round(period / CYCLE)
+    double = CYCLE * round(0.2 * period / CYCLE) / period
+    rhythm = replace(RHYTHM, period=period, double=double, com_height=height, rest=rest)
+    steps, place, soon, both = [(0.0, 0.0)] * 2, (0.0, -side * 0.084), period - 1e-9, rhythm.both
+    zmp, held, went, times = (
+        (-ahead, -side * 0.084),
+        (0.0, 0.0),
+        [],
+        CYCLE * np.arange(round(period / CYCLE) + 200),
+    )
+    com, rate = law.entry(rhythm, side, (ahead, side * 0.084), steps[0]), (0.0, 0.0)
+    for tau in times.tolist():
+        dcm = com[0] + rate[0] / rhythm.w, com[1] + rate[1] / rhythm.w
+        since = tau if tau < soon else tau - period
+        if tau < soon:
+            course = _Course(tau, period, side, held, place)
+            decided = law.step_landing(rhythm, Gains(), course, dcm, zmp, steps, 0.0, 0.0)  # type: ignore[arg-type]
+            held, wanted = decided.held, decided.zmp
+        else:
+            wanted = law.stopping_zmp(rhythm, since, dcm, zmp, place)
+            went.append(side * (com[1] - rest[1] - 0.5 * place[1]))
+        ease = CYCLE / max(both - since, CYCLE) if tau < soon or since < both - 1e-9 else 0.3
+        zmp = zmp[0] + (wanted[0] - zmp[0]) * ease, zmp[1] + (wanted[1] - zmp[1]) * ease
+        com, rate = law.pendulum(com, rate, zmp, rhythm.w, CYCLE)
+    np.testing.assert_allclose(com, (rest[0], rest[1] + 0.5 * place[1]), atol=1e-3)
+    assert min(went) > -0.001  # never beyond the point of rest, to the side of the foot that landed
+
+
 def _landed(ahead: float, aside: float, side: float) -> float:
     """Duration of a step in which the DCM begins so far beside the foot that stands, inwards and ahead."""
     period, tau, held, place, zmp = RHYTHM.period, RHYTHM.both, (0.0, 0.0), (0.05, -side * 0.084), (0.0, 0.0)
@@ -116,7 +153,7 @@ def _landed(ahead: float, aside: float, side: float) -> float:
     while tau < period - 1e-9:
         dcm = com[0] + rate[0] / RHYTHM.w, com[1] + rate[1] / RHYTHM.w
         course = _Course(tau, period, side, held, place)
-        decided = law.step_landing(RHYTHM, Gains(), course, dcm, zmp, [(0.05, 0.0)] * 2, 1.0)  # type: ignore[arg-type]
+        decided = law.step_landing(RHYTHM, Gains(), course, dcm, zmp, [(0.05, 0.0)] * 2, 1.0, 1.0)  # type: ignore[arg-type]
         period, held, place, zmp = decided.period, decided.held, decided.place, decided.zmp
         com, rate = law.pendulum(com, rate, zmp, RHYTHM.w, CYCLE)
         tau += CYCLE
@@ -151,7 +188,7 @@ def test_a_larger_robot_is_answered_as_a_small_one(
         x = [far * v for v in values]
         course = _Course(tau * time, 0.4 * time, side, (x[0], x[1]), (x[2], x[3] - side * 0.084 * far))
         steps = [(x[4], 0.0), (x[5], 0.0)]
-        landing = law.step_landing(rhythm, Gains(), course, (x[6], x[7]), (x[0], x[1]), steps, 1.0)  # type: ignore[arg-type]
+        landing = law.step_landing(rhythm, Gains(), course, (x[6], x[7]), (x[0], x[1]), steps, 1.0, 1.0)  # type: ignore[arg-type]
         shift = law.first_shift(rhythm, course, (x[6], x[7]), (x[0], -side * 0.084 * far), steps[0])  # type: ignore[arg-type]
         lengths = np.array([*landing.zmp, *landing.place, *landing.held, *shift]) / far
         return np.array([*lengths, landing.period / time])
@@ -197,7 +234,7 @@ def test_the_first_shift_leads_onto_the_periodic_orbit(
         tau += cycle
     dcm = com[0] + rate[0] / rhythm.w, com[1] + rate[1] / rhythm.w
     course = _Course(rhythm.both, period, side, (0.0, 0.0), (0.0, 0.0))
-    decided = law.step_landing(rhythm, Gains(), course, dcm, here, [step, step], 0.0)  # type: ignore[arg-type]
+    decided = law.step_landing(rhythm, Gains(), course, dcm, here, [step, step], 1.0, 0.0)  # type: ignore[arg-type]
     np.testing.assert_allclose(decided.held, here, atol=0.03 * apart)
 
 
