@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from statistics import median
 
-from benchmarks.walking.pieces import ENGINES, SERVOS, STEPS, WAYS, WORLDS, Row
+from benchmarks.walking.pieces import ENGINES, SERVOS, STEPS, USUAL, WAYS, WORLDS, Row
 from screwkin.campaign.statistics import mcnemar, wilson
 
 NAMES = {"mujoco": "MuJoCo", "pybullet": "PyBullet"}
 _HEAD = [
     "# Walks in other worlds than the planned one",
     "",
-    f"`python -m benchmarks.walking` plays a walk of the Bioloid, {STEPS} steps of 50 mm, in worlds drawn",
+    f"`python -m benchmarks.walking` plays a walk of the Bioloid, {STEPS} steps of {500 * USUAL['stride']:.0f} mm, in worlds drawn",
     "from the seeds of `benchmarks/walking/judging.txt`, by which no gain was chosen: screwkin's plan of",
     "0.35 s a step with feedback and open loop, and placo's plan of the same footholds at 0.5 and at 1 s a",
     "step. All get commands that allow for the servos. No foot feels forces, and senses are wrong in every",

@@ -17,7 +17,7 @@ from screwkin.analysis.engines import Engine
 from screwkin.campaign.world import world_of
 
 ROBOT = "bioloid"
-USUAL = {"stride": 0.1, "lift": 0.012, "lead": 1.0, "horizon": 1.0}
+USUAL = {"stride": 0.07, "lift": 0.012, "lead": 1.0, "horizon": 1.0}
 STEPS = 12
 NOISE = "imu_noise=0.002 sense_lag=0.01 cells=0"
 """Of every world: no force cells, an attitude that jitters by 0.1 degree, a cycle late; and a bias."""
@@ -53,7 +53,7 @@ def _pushes() -> list[str]:
 WORLDS: Mapping[str, Sequence[str]] = {
     "x3": [f"x3 {BIAS} {NOISE}"] * 60,
     "lags": [f"lag~0.02 each_lag~1 {BIAS} {NOISE}"] * 60,
-    "rise of 5 mm": [f"{BIAS} rise=0.005 rise_at={0.105 + 0.02 * k:.3f} {NOISE}" for k in range(20)],
+    "rise of 5 mm": [f"{BIAS} rise=0.005 rise_at={0.08 + 0.015 * k:.3f} {NOISE}" for k in range(20)],
     "push of .2 N s": _pushes(),
 }
 """The worlds of the runs by name, as ``sweep --perturb`` takes them."""
