@@ -12,8 +12,9 @@ NAMES = {"mujoco": "MuJoCo", "pybullet": "PyBullet"}
 _HEAD = [
     "# Walks in other worlds than the planned one",
     "",
-    f"`python -m benchmarks.walking` plays a walk of the Bioloid, {STEPS} steps of {500 * USUAL['stride']:.0f} mm, in worlds drawn",
-    "from the seeds of `benchmarks/walking/judging.txt`, by which no gain was chosen: screwkin's plan of",
+    "`python -m benchmarks.walking` plays a walk of the Bioloid in worlds drawn from the seeds of",
+    "`benchmarks/walking/judging.txt`, by which no gain was chosen: "
+    f"{STEPS} steps of {500 * USUAL['stride']:.0f} mm, screwkin's plan of",
     "0.35 s a step with feedback and open loop, and placo's plan of the same footholds at 0.5 and at 1 s a",
     "step. All get commands that allow for the servos. No foot feels forces, and senses are wrong in every",
     "world: .002 rad of jitter, up to .02 rad of bias about each axis, 10 ms late. Intervals are Wilson's at",
