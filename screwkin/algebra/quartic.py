@@ -150,13 +150,22 @@ def cube_root(x: Scalar) -> Scalar:
 
 
 def _polished(coefficients: Sequence[Scalar], c: Scalar, s: Scalar) -> tuple[Scalar, Scalar]:
-    a0, a1, b1, a2, b2 = coefficients
+    """Two Newton steps, each only where it helps: at a double root value and slope may both be rounding."""
+    value, slope = _value_and_slope(coefficients, c, s)
     for _ in range(2):
-        c2, s2 = c * c - s * s, 2 * c * s
-        value = a0 + a1 * c + b1 * s + a2 * c2 + b2 * s2
-        slope = b1 * c - a1 * s + 2 * (b2 * c2 - a2 * s2)
         step = -value / where(slope * slope > 0, slope, 1.0)
         turned = c - s * step, s + c * step
         inverse = 1 / sqrt(turned[0] * turned[0] + turned[1] * turned[1])
-        c, s = turned[0] * inverse, turned[1] * inverse
+        here = turned[0] * inverse, turned[1] * inverse
+        new = _value_and_slope(coefficients, *here)
+        better = abs_(new[0]) < abs_(value)
+        pairs = zip((*here, *new), (c, s, value, slope), strict=True)
+        c, s, value, slope = (where(better, a, b) for a, b in pairs)
     return c, s
+
+
+def _value_and_slope(coefficients: Sequence[Scalar], c: Scalar, s: Scalar) -> tuple[Scalar, Scalar]:
+    """Of the function at a point of the circle."""
+    a0, a1, b1, a2, b2 = coefficients
+    c2, s2 = c * c - s * s, 2 * c * s
+    return a0 + a1 * c + b1 * s + a2 * c2 + b2 * s2, b1 * c - a1 * s + 2 * (b2 * c2 - a2 * s2)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from screwkin.algebra.quartic import circle_roots
+from screwkin.algebra.quartic import circle_points, circle_roots
 from screwkin.algebra.se3 import UNTURNED, Pose, Vector, as_array, cross, dot, rotate
 from screwkin.ik.point_turns import point_turns
 from screwkin.ik.spherical_hip import spherical_hip_branches
@@ -48,6 +48,16 @@ def test_a_root_at_half_a_turn_is_as_good_as_any(angle):
 def test_double_roots_lose_half_of_the_digits_and_no_more():
     roots = np.random.default_rng(2).uniform(-np.pi, np.pi, (500, 2)).repeat(2, axis=1)
     assert worst(circle_roots(*coefficients(roots)), roots) < 1e-5
+
+
+def test_double_roots_lose_no_more_as_points_on_the_circle():
+    """At double roots value and slope are rounding: a Newton step by their ratio leads anywhere."""
+    rng = np.random.default_rng(3)
+    pairs = rng.uniform(-np.pi, np.pi, (5000, 2))
+    pairs[:2500, 1] = pairs[:2500, 0] + np.pi
+    roots = pairs.repeat(2, axis=1)
+    points = circle_points(list(coefficients(roots)))
+    assert worst(np.array([np.arctan2(point.s, point.c) for point in points]), roots) < 1e-4
 
 
 def test_a_function_of_first_degree_has_its_two_roots():
