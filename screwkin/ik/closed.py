@@ -75,8 +75,16 @@ class ClosedForm:
 
     def at(self, wanted: Pose | Vector) -> list[Branch]:
         """The same of the displacement of the tip link, or of a position."""
+        return self._in_order(self.formulas.formula(self._walked(wanted)))
+
+    def ways(self, target: Pose) -> list[Branch]:
+        """All that could be branches, each with how far it misses (``Formulas.ways``), if it has any."""
+        ways = self.formulas.ways
+        return self._in_order(ways(self._walked(self._displacement(target)))) if ways else []
+
+    def _in_order(self, branches: list[Branch]) -> list[Branch]:
         order = slice(None, None, -1) if self.backwards else slice(None)
-        return [(*branch[:-1][order], branch[-1]) for branch in self.formulas.formula(self._walked(wanted))]
+        return [(*branch[:-1][order], branch[-1]) for branch in branches]
 
     def arrays(self, wanted: Pose | Vector, count: int) -> Array:
         """Joint positions (k, n, count) of all branches of such displacements or positions, (count,) each."""

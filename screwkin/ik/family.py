@@ -24,10 +24,14 @@ class Formulas:
             ``Vector``), to all branches, a fixed number of them; any scalar.
         arrays: the same over arrays (branches, n, B), for places where the formula loses its digits; default:
             the formula's.
+        ways: all that could be branches, bends always in one order, each with how far it misses in place of
+            the slack; any scalar. Every branch is among them to many digits, also where the formula loses
+            them; which one it is changes from pose to pose. None where branches keep apart.
     """
 
     formula: Callable[[Any], list[Branch]]
     arrays: Callable[[Any], Array] | None = None
+    ways: Callable[[Any], list[Branch]] | None = None
 
 
 @dataclass(frozen=True)

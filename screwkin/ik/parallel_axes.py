@@ -12,7 +12,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.quartic import circle_points, circle_roots
-from screwkin.algebra.scalar import Scalar, atan2, least, where
+from screwkin.algebra.scalar import Scalar, abs_, atan2, larger, least, where
 from screwkin.algebra.screws import Screw, displacement
 from screwkin.algebra.se3 import Pose, Vector, cross, dot, map_scalars, norm, rotate
 from screwkin.ik.family import Formulas
@@ -37,6 +37,7 @@ def recognise(chain: SerialChain) -> Formulas | list[str]:
     return Formulas(
         lambda D: parallel_axes_points(chain.screws, D, chain.length),
         lambda D: parallel_axes_branches(chain.screws, D, chain.length),
+        lambda D: parallel_axes_ways(chain.screws, D),
     )
 
 
@@ -213,3 +214,38 @@ def parallel_axes_points(screws: Sequence[Screw], D: Pose, length: float) -> lis
         for q3, q4, q5, slack in planar_branches(screws[2:5], E):
             branches.append((q1, q2, q3, q4, q5, q6, least(least(slack, point.slack), apart)))
     return branches
+
+
+def parallel_axes_ways(screws: Sequence[Screw], D: Pose) -> list[tuple[Scalar, ...]]:
+    """Both directions of the parallel axes at every root of the quartic, and both bends of each.
+
+    Where two roots nearly fall together, as in hips whose axes nearly meet, the volume vanishes by which
+    ``parallel_axes_points`` divides, and roots are known to half their digits. The directions are known to
+    more: they obey the best conditioned two of the three equations.
+
+    Returns:
+        Six angles a set, sixteen of them, and by how much the equations of the hip are missed.
+    """
+    equations = HipEquations.of(screws, D)
+    s1, s2, y, s6 = screws[0], screws[1], screws[2].s, screws[5]
+    ways = []
+    for point in circle_points(equations.quartic()):
+        c, s = point.c, point.s
+        q1 = atan2(s, c)
+        for n in pitch_directions(equations, c, s):
+            q6 = -turn_onto(s6.s, y, D.R.T @ n)
+            q2 = turn_onto(s2.s, y, rotate(s1.s, -q1) @ n)
+            hip = displacement(s1, q1) @ displacement(s2, q2)
+            E = hip.inverse @ D @ displacement(s6, -q6)
+            for q3, q4, q5, _ in planar_branches(screws[2:5], E):
+                ways.append((q1, q2, q3, q4, q5, q6, _missed(equations, c, s, n)))
+    return ways
+
+
+def _missed(equations: HipEquations, c: Scalar, s: Scalar, n: Vector) -> Scalar:
+    """Largest residual of the three equations, of unit vectors, for a direction n."""
+    reach = equations.reach.at(c, s)
+    size = norm(reach)
+    off = abs_(dot(reach, n) - equations.offset) / where(size > 0, size, 1.0)
+    level = abs_(dot(equations.axis.at(c, s), n) - equations.level)
+    return larger(larger(level, abs_(dot(equations.ankle, n) - equations.tilt)), off)
