@@ -8,6 +8,7 @@ shifts would tilt their soles. Where the usual pace will not do, these follow:
 - slower steps, for quick joints, and quicker ones, which need less sway;
 - quick steps whose ZMP keeps to the inner half of the sole, then with the feet apart, for hips that turn in
   little;
+- feet nearer to each other, where soles leave room: less sway then leaves legs more of their reach;
 - a waist that tilts, then with the feet apart, or leans over the foot that stands: a hip carries all but its
   leg beside it, by the distance that its CoM keeps from the hip, and only a lean makes that shorter; where
   the waist also shifts, as it does when it tilts about a line below the hips, less of a lean is needed, and
@@ -58,6 +59,8 @@ INWARD = 0.5
 """How far from the middle of the sole to its inner edge the ZMP goes, where hips turn in too little."""
 WIDER = 0.05
 """How much further each foot then stands from the middle, in leg lengths."""
+NEARER = 0.1
+"""How much nearer to the middle each foot stands at most, where sway takes too much reach, in leg lengths."""
 PIVOT = 0.5
 """Height of the line about which a waist tilts, in leg lengths."""
 SOLE_GAP = 0.02
@@ -129,6 +132,9 @@ def other_paces(robot: Robot, usual: Gait) -> Iterator[Gait]:
     yield from (_quick(inward, period) for period in QUICK_PERIODS)
     wide = f"{_spread(robot, usual) + WIDER:.4g}*leg"
     yield from (_quick(inward.replace(spread=wide), period) for period in QUICK_PERIODS)
+    nearer = min(NEARER, 0.5 * (_gap(robot, usual) - SOLE_GAP))
+    if nearer > 0:
+        yield upright.replace(spread=f"{-nearer:.4g}*leg")
     tilting = upright.replace(lateral="tilt", pivot=f"{PIVOT:g}*leg")
     yield from (tilting.replace(period=period) for period in TILTING)
     yield tilting.replace(spread=f"{_spread(robot, usual) + 2 * WIDER:.4g}*leg")
@@ -154,13 +160,18 @@ def _without_ankle_roll(robot: Robot) -> bool:
 
 def _spread(robot: Robot, gait: Gait) -> float:
     """By how much each foot is to stand further from the middle than at home, in leg lengths."""
+    return max(0.0, 0.5 * (SOLE_GAP - _gap(robot, gait)))
+
+
+def _gap(robot: Robot, gait: Gait) -> float:
+    """Distance between the feet at home, in leg lengths."""
     stance, leg = stance_of(robot), gait.lengths["leg"]
     left, right = (
         convex_hull(np.asarray(foot.sole + foot.body, dtype=float))
         + np.array([0.0, foot.side * stance.foot_y])
         for foot in sorted(stance.feet, key=lambda foot: -foot.side)
     )
-    return max(0.0, 0.5 * (SOLE_GAP - float(sole_distance(left[None], right[None])[0]) / leg))
+    return float(sole_distance(left[None], right[None])[0]) / leg
 
 
 def _ahead(robot: Robot) -> float:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import screwkin as sk
 from screwkin.algebra.se3 import Vector
 from screwkin.anatomy.humanoid import humanoid
-from screwkin.gait.paces import LEAST_AHEAD, SOLE_GAP, STANDING_SHARE, other_paces, usual_pace
+from screwkin.gait.paces import LEAST_AHEAD, NEARER, SOLE_GAP, STANDING_SHARE, other_paces, usual_pace
 from screwkin.gait.stance import stance_of
 from screwkin.kinematics.mass import GRAVITY
 from screwkin.model.urdf_in import parse_urdf
@@ -48,6 +48,19 @@ def test_soles_that_would_touch_are_set_apart_by_the_least_gap(robot, by):
     gap = 2 * (stance.foot_y + pace.spread + inner)
     least = SOLE_GAP * pace.lengths["leg"]
     assert gap == pytest.approx(max(least, gap - 2 * pace.spread), abs=1e-4)
+
+
+@pytest.mark.parametrize("by", [-0.02, 0.02, 0.05])
+def test_feet_come_nearer_only_as_far_as_soles_leave_room(robot, by):
+    wide = widened(robot, by)
+    usual, stance = usual_pace(wide), stance_of(wide)
+    inner = min(foot.side * y for foot in stance.feet for _, y in foot.sole)
+    least, leg = SOLE_GAP * usual.lengths["leg"], usual.lengths["leg"]
+    spreads = [pace.spread for pace in other_paces(wide, usual)]
+    room = 2 * (stance.foot_y + inner) - least
+    assert min(spreads) == pytest.approx(
+        max(-0.5 * room, -NEARER * leg) if room > 0 else usual.spread, abs=1e-4
+    )
 
 
 @settings(max_examples=6)
