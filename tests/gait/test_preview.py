@@ -57,6 +57,16 @@ def test_a_standing_reference_leaves_the_cart_at_rest_where_it_is() -> None:
     assert np.abs(cart.velocity).max() < 1e-12
 
 
+def test_beyond_its_end_a_reference_stays_at_its_last_value() -> None:
+    """One cut off in the middle of a step moves as one that goes on at the value it was cut at."""
+    gains = preview_gains(0.02, 0.43, 1.6)
+    reference = 0.05 * np.sin(np.linspace(0.0, 7.0, 120))[:, None] + [0.1, -0.2]
+    on = follow_reference(gains, np.concatenate([reference, np.repeat(reference[-1:], 90, axis=0)]))
+    cut = follow_reference(gains, reference)
+    for name in ("com", "velocity", "acceleration", "zmp"):
+        np.testing.assert_allclose(getattr(cut, name), getattr(on, name)[:120], rtol=0, atol=1e-12)
+
+
 @pytest.mark.parametrize(
     ("values", "message"),
     [
