@@ -21,7 +21,7 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array
 from screwkin.dynamics.terrain import FLAT, Terrain
-from screwkin.errors import InputError, needed_for
+from screwkin.errors import InputError, NoSolutionError, needed_for
 from screwkin.kinematics.positions import tree_positions
 from screwkin.model.inertias import impossible
 from screwkin.model.robot import Joint, Robot
@@ -171,6 +171,7 @@ class MuJoCoBackend:
         data.efc_aref[rows] = wanted[driven]
         mj.mj_step2(model, data)
         data.xfrc_applied[self._base, :3] = 0.0
+        self._refuse_unstable()
         motor[driven] = data.efc_force[rows]
         self._motor = motor[self._dof]
         self._torque = action.torque + self._motor
@@ -182,6 +183,22 @@ class MuJoCoBackend:
         if self._window is not None and self._steps % 20 == 0:
             self._window.sync()
             time.sleep(max(0.0, self._began + self._steps * self.dt - time.monotonic()))
+
+    def _refuse_unstable(self) -> None:
+        """Raise where MuJoCo has met NaN or huge numbers, and begun anew from its first state.
+
+        Raises:
+            NoSolutionError: says when.
+        """
+        kinds = self._mj.mjtWarning
+        bad = (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC)
+        if any(self.data.warning[kind].number for kind in bad):
+            when = f"{self._steps * self.dt:.3f} s"
+            raise NoSolutionError(
+                f"{self._robot.name}: the simulation in MuJoCo is unstable after {when}"
+                " (NaN or huge accelerations); links of next to no mass that joints couple or close are the"
+                " usual reason: give them masses and inertias, or simulate in shorter steps"
+            )
 
     def observe(self) -> Observation:
         """The state after the last step."""

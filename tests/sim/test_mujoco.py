@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import screwkin as sk
-from screwkin.errors import InputError, MissingDependencyError, RobotRemark
+from screwkin.errors import InputError, MissingDependencyError, NoSolutionError, RobotRemark
 from screwkin.model.robot import Inertia, Joint, Robot
 from screwkin.sim.backend import Command, Observation
 from screwkin.sim.mujoco import MuJoCoBackend, MuJoCoPhysics
@@ -238,3 +238,13 @@ def test_an_inertia_that_no_body_has_is_balanced_and_said() -> None:
     backend = MuJoCoBackend(robot)
     assert "inertia balanced of torso" in backend.settings["remarks"]
     assert not any("balanced" in text for text in MuJoCoBackend(sk.load_robot("bioloid")).settings["remarks"])
+
+
+def test_a_simulation_that_explodes_says_so_and_does_not_begin_anew(robot: Robot) -> None:
+    """MuJoCo puts itself back into its first state then, as if nothing had been."""
+    backend, state = MuJoCoBackend(robot), sk.home(robot)
+    stand(backend, state, 1)
+    backend.data.qvel[:] = 1e12
+    q, rest = np.asarray(state.q), np.zeros(len(state.q))
+    with pytest.raises(NoSolutionError, match=r"unstable after 0\.00"):
+        backend.step(Command(q, rest, state.T_world_base))
