@@ -145,6 +145,8 @@ def test_a_gait_that_does_not_follow_its_feet_takes_no_list() -> None:
         sk.walk(ROBOT, sk.load_gait("walk"), sk.footsteps([(0.05, -0.04, 0)]))
     with pytest.raises(InputError, match="first is 'middle'"):
         sk.footsteps([(0, 0, 0)], first="middle")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="expected 'right' or 'left'"):
+        sk.footsteps([(0, 0, 0)], np.zeros((2, 3)))  # type: ignore[arg-type]
 
 
 def test_a_file_of_footsteps_is_read_with_formulas_and_feet(tmp_path: Path) -> None:
