@@ -96,17 +96,18 @@ class Senses:
         self._feet = [[leg.tip for leg in legs].index(tip) for tip in feet]
         self._links = {legs[i].link: k for k, i in enumerate(self._feet)}
         self._upright = Terrain(*by.slope).R if any(by.slope) else np.eye(3)
-        self._by, self._time = by, 0.0
+        self._by, self._drift = by, 0.0
         self._late: list[Felt] = []
-        self._draw = np.random.default_rng([by.seed, 2])
+        self._draw, self._wander = (np.random.default_rng([by.seed, k]) for k in (2, 3))
 
     def feel(self, seen: Observation, period: float) -> Felt:
         """What is felt of an observation; called once in every period [s]."""
         by = self._by
         turn = np.array(by.imu_bias) + by.imu_noise * self._draw.standard_normal(3)
         wrong = as_array(rotation_exp(vector_from_array(turn))) if turn.any() else np.eye(3)
-        drift = as_array(rotate(Z, by.imu_rate_bias[2] * self._time))
-        self._time += period
+        drift = as_array(rotate(Z, self._drift))
+        rate = by.imu_rate_bias[2] + by.imu_rate_noise * self._wander.standard_normal()
+        self._drift += rate * period
         attitude = drift @ self._upright @ seen.T_world_base[:3, :3] @ wrong
         force, pressure = self._pressed(seen) if by.cells else (np.ones(2), np.zeros((2, 2)))
         self._late.append(Felt(attitude, np.array(seen.q), force, pressure))

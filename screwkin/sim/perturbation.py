@@ -40,9 +40,9 @@ class Perturbation:
     never arrive, each of frame [s]; the servos stay at the one before.
 
     Of the senses: imu_noise [rad] and imu_rate_noise [rad/s]: standard deviations about each axis; imu_bias
-    [rad] and imu_rate_bias [rad/s], about the axes of the base, of which what is about the vertical turns the
-    heading more and more; sense_lag [s]: from what happens to its reading; cells: 1 if feet feel forces, 0 if
-    not. seed: of what is random in a run.
+    [rad] and imu_rate_bias [rad/s], about the axes of the base. Gravity holds the lean; what rates are wrong
+    by about the vertical turns the heading more and more, a noise's as it wanders. sense_lag [s]: from what
+    happens to its reading; cells: 1 if feet feel forces, 0 if not. seed: of what is random in a run.
     """
 
     mass: Figure = 1.0

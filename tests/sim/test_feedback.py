@@ -78,6 +78,19 @@ def test_a_heading_drifts_and_gravity_does_not(robot: Robot) -> None:
     np.testing.assert_allclose(felt[-1], as_array(rotate(Z, 0.1 * 49 * PERIOD) @ rotate(X, 0.2)), atol=1e-12)
 
 
+def test_a_heading_wanders_by_the_noise_of_its_rate(robot: Robot) -> None:
+    """After n cycles by the noise times the root of n of them, about no direction; nothing leans."""
+    seen, n, far = standing(robot), 50, []
+    for seed in range(60):
+        senses = Senses(robot, Perturbation(imu_rate_noise=0.2, seed=seed), FEET)
+        attitude = [senses.feel(seen, PERIOD).attitude for _ in range(n + 1)][-1]
+        far.append(np.arctan2(attitude[1, 0], attitude[0, 0]))
+        assert attitude[2, 2] == pytest.approx(1.0, abs=1e-12)
+    deviation = 0.2 * PERIOD * np.sqrt(n)
+    assert np.std(far) == pytest.approx(deviation, rel=0.3)
+    assert abs(np.mean(far)) < 4.0 * deviation / np.sqrt(60)
+
+
 def test_noise_has_its_deviation_a_bias_stays_and_a_late_sense_is_of_before(robot: Robot) -> None:
     seen = standing(robot)
     noisy = Senses(robot, Perturbation(imu_noise=0.01, imu_bias=(0.05, 0.0, 0.0), seed=4), FEET)
