@@ -61,7 +61,7 @@ def footsteps(places: Iterable[Sequence[float]], first: Side = "right") -> Foots
         >>> bool(sk.walk(robot, sk.load_gait("preview"), steps).margin.min() > 0)
         True
     """
-    if not any(str(first) == side for side in CHOICES["first"]):
+    if str(first) not in CHOICES["first"]:
         raise InputError(f"first is {first!r}; expected 'right' or 'left'")
     rows = [_row(i, place) for i, place in enumerate(places)]
     return _read(rows, first, "footsteps")
