@@ -89,7 +89,7 @@ def _facet(points: Array, normal: Array, band: float) -> Facet:
 
 
 def axes_across(up: Array) -> Array:
-    """Two unit vectors (3, 2) that span the plane axes_across a direction."""
+    """Two unit vectors (3, 2) that span the plane across a direction."""
     e = np.eye(3)[int(np.argmin(np.abs(up)))]
     first = np.cross(up, e)
     first = first / np.linalg.norm(first)

@@ -17,6 +17,7 @@ from screwkin.model.state import State
 from screwkin.stabiliser.body import WalkingBody
 from screwkin.stabiliser.cycle import STARTING, Memory
 from screwkin.stabiliser.law import Rhythm
+from screwkin.stabiliser.odometry import seen_from
 from screwkin.trajectory import Trajectory
 
 CYCLE = 0.01
@@ -114,9 +115,9 @@ def rhythm_of(plan: Trajectory, tips: tuple[str, str], swings: list[Swing], sole
 def _rest(plan: Trajectory, tips: tuple[str, str]) -> tuple[float, float]:
     """Where the CoM rests at the end of a plan, beside the middle between the feet, in their heading [m]."""
     right, left = (_place(plan, tip, -1) for tip in tips)
-    x, y = plan.com[-1, :2] - 0.5 * (right + left)[:2]
-    c, s = np.cos(left[2]), np.sin(left[2])
-    return float(c * x + s * y), float(c * y - s * x)
+    middle = np.array([*0.5 * (right + left)[:2], left[2]])
+    ahead, aside, _ = seen_from(np.array([*plan.com[-1, :2], left[2]]), middle).tolist()
+    return ahead, aside
 
 
 def steps_of(plan: Trajectory, tips: tuple[str, str], rhythm: Rhythm, swings: list[Swing]) -> Array:
@@ -124,11 +125,9 @@ def steps_of(plan: Trajectory, tips: tuple[str, str], rhythm: Rhythm, swings: li
     rows = []
     for swing in swings:
         stands = _place(plan, tips[1 - swing.foot], swing.lands)
-        x, y, yaw = _place(plan, tips[swing.foot], swing.lands + 1) - stands
-        c, s = np.cos(stands[2]), np.sin(stands[2])
+        x, y, yaw = seen_from(_place(plan, tips[swing.foot], swing.lands + 1), stands)
         side = -1.0 if swing.foot else 1.0  # of the foot that stands
-        aside = c * y - s * x + side * 2.0 * rhythm.apart
-        rows.append([c * x + s * y, aside, (yaw + np.pi) % (2.0 * np.pi) - np.pi])
+        rows.append([x, y + side * 2.0 * rhythm.apart, (yaw + np.pi) % (2.0 * np.pi) - np.pi])
     return np.array(rows)
 
 
