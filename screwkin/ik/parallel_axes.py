@@ -200,20 +200,25 @@ def parallel_axes_points(screws: Sequence[Screw], D: Pose, length: float) -> lis
     """
     equations = HipEquations.of(screws, D)
     N, d = equations.solution()
-    s1, s2, y, s6 = screws[0], screws[1], screws[2].s, screws[5]
     branches = []
     for point in circle_points(equations.quartic()):
         c, s = point.c, point.s
         volume = d[0] + d[1] * c + d[2] * s
         apart = volume * volume / length**2
         n = N.at(c, s) / where(apart > 0, volume, 1.0)
-        q1, q6 = atan2(s, c), -turn_onto(s6.s, y, D.R.T @ n)
-        q2 = turn_onto(s2.s, y, rotate(s1.s, -q1) @ n)
-        hip = displacement(s1, q1) @ displacement(s2, q2)
-        E = hip.inverse @ D @ displacement(s6, -q6)
-        for q3, q4, q5, slack in planar_branches(screws[2:5], E):
-            branches.append((q1, q2, q3, q4, q5, q6, least(least(slack, point.slack), apart)))
+        for *q, slack in _bends(screws, D, atan2(s, c), n):
+            branches.append((*q, least(least(slack, point.slack), apart)))
     return branches
+
+
+def _bends(screws: Sequence[Screw], D: Pose, q1: Scalar, n: Vector) -> list[tuple[Scalar, ...]]:
+    """Six angles and the slack of both bends, the first joint at q1 and the parallel axes along n."""
+    s1, s2, y, s6 = screws[0], screws[1], screws[2].s, screws[5]
+    q6 = -turn_onto(s6.s, y, D.R.T @ n)
+    q2 = turn_onto(s2.s, y, rotate(s1.s, -q1) @ n)
+    hip = displacement(s1, q1) @ displacement(s2, q2)
+    E = hip.inverse @ D @ displacement(s6, -q6)
+    return [(q1, q2, q3, q4, q5, q6, slack) for q3, q4, q5, slack in planar_branches(screws[2:5], E)]
 
 
 def parallel_axes_ways(screws: Sequence[Screw], D: Pose) -> list[tuple[Scalar, ...]]:
@@ -227,18 +232,13 @@ def parallel_axes_ways(screws: Sequence[Screw], D: Pose) -> list[tuple[Scalar, .
         Six angles a set, sixteen of them, and by how much the equations of the hip are missed.
     """
     equations = HipEquations.of(screws, D)
-    s1, s2, y, s6 = screws[0], screws[1], screws[2].s, screws[5]
     ways = []
     for point in circle_points(equations.quartic()):
         c, s = point.c, point.s
         q1 = atan2(s, c)
         for n in pitch_directions(equations, c, s):
-            q6 = -turn_onto(s6.s, y, D.R.T @ n)
-            q2 = turn_onto(s2.s, y, rotate(s1.s, -q1) @ n)
-            hip = displacement(s1, q1) @ displacement(s2, q2)
-            E = hip.inverse @ D @ displacement(s6, -q6)
-            for q3, q4, q5, _ in planar_branches(screws[2:5], E):
-                ways.append((q1, q2, q3, q4, q5, q6, _missed(equations, c, s, n)))
+            missed = _missed(equations, c, s, n)
+            ways += [(*q, missed) for *q, _ in _bends(screws, D, q1, n)]
     return ways
 
 
