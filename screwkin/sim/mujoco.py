@@ -116,6 +116,9 @@ class MuJoCoBackend:
         couple_in_mujoco(mj, spec, robot)
         self.model = spec.compile()
         self.data = mj.MjData(self.model)
+        kinds = mj.mjtWarning
+        self._unstable = [int(k) for k in (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC)]
+        self._warned = self.data.warning.number  # by kind; MuJoCo counts on in it
         self._tree = np.array([self.model.joint(joint.name).qposadr[0] for joint in robot.tree], dtype=int)
         joints = [self.model.joint(name) for name in robot.joint_names]
         self._qpos = np.array([joint.qposadr[0] for joint in joints], dtype=int)
@@ -190,9 +193,7 @@ class MuJoCoBackend:
         Raises:
             NoSolutionError: says when.
         """
-        kinds = self._mj.mjtWarning
-        bad = (kinds.mjWARN_BADQPOS, kinds.mjWARN_BADQVEL, kinds.mjWARN_BADQACC)
-        if any(self.data.warning[kind].number for kind in bad):
+        if any(self._warned[kind] for kind in self._unstable):
             when = f"{self._steps * self.dt:.3f} s"
             raise NoSolutionError(
                 f"{self._robot.name}: the simulation in MuJoCo is unstable after {when}"
