@@ -22,7 +22,8 @@ import numpy as np
 from screwkin.algebra.arrays import Array
 from screwkin.dynamics.terrain import Terrain
 from screwkin.errors import Fault, GaitError, InputError
-from screwkin.gait.footsteps import Foothold, footholds, swing_side
+from screwkin.gait.bearing import bearing, supports
+from screwkin.gait.footsteps import Foothold, footholds
 from screwkin.gait.lead import at_home, led, samples_of, share_of_home
 from screwkin.gait.motion import Motion
 from screwkin.gait.over_feet import headings, levels, waist_over
@@ -31,7 +32,7 @@ from screwkin.gait.preview import CartMotion, follow_reference, preview_gains
 from screwkin.gait.record import Gait
 from screwkin.gait.stance import Stance
 from screwkin.gait.steering import Steering
-from screwkin.gait.tracking import Tracked, beyond_carts, cart_heights, com_along, com_over
+from screwkin.gait.tracking import Tracked, beyond_carts, cart_heights, com_along, com_over, on_edges
 from screwkin.mechanism.mechanism import Mechanism
 
 SETTINGS = ("dsp", "horizon", "Qe", "Qx", "R")
@@ -100,9 +101,13 @@ def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -
         planned = around(cart)
     else:
         planned = steering.moved(around(_straight(cart)), (cart.com - cart.com[:1]) * (0, 1 / aside))
+        shares = bearing(mechanism, gait, stance, steps, time - more / gait.rate)
+        steering = replace(steering, bearing=shares)
     if gait.com == "waist":
         return replace(planned, notes=("the waist is taken for the CoM",))
     now = com_along(mechanism, steering, Tracked.of(mechanism, steering, planned), cart)
+    if steering.bearing is not None:
+        now = com_along(mechanism, steering, on_edges(mechanism, now, planned, stance), cart)
     for _ in range(PASSES if gait.model == "links" else 0):
         beyond = beyond_carts(mechanism, now, heights, more)[more : more + count]
         now = com_along(mechanism, steering, now, cart_along(reference - beyond))
@@ -138,11 +143,10 @@ def zmp_reference(gait: Gait, stance: Stance, holds: tuple[Foothold, ...], steps
     """Wanted ZMP (T, 2): at rest between the feet, else in the supporting sole [m].
 
     There it goes from ``roll`` on the side that the other foot leaves to ``roll`` on the side where it lands,
-    about the middle and along the foot's x axis. Before the first swing of a waist that leans it goes to the
-    foot that swings, and after the last one to the foot that swung, for half a phase: so the first lean is
-    no larger than the next ones. The gait's number ``ahead`` (default 1) times as far ahead of the tips as
-    the middle, which lie below the ankles: these then bear less torque. Its number ``inward`` (default 0) of
-    the way from the middle to the edge at the other foot: the CoM then sways less.
+    about the middle and along the foot's x axis, at the times of ``supports``. The gait's number ``ahead``
+    (default 1) times as far ahead of the tips as the middle, which lie below the ankles: these then bear less
+    torque. Its number ``inward`` (default 0) of the way from the middle to the edge at the other foot: the
+    CoM then sways less.
 
     Args:
         gait: of kind ``preview`` or ``footsteps``.
@@ -153,25 +157,19 @@ def zmp_reference(gait: Gait, stance: Stance, holds: tuple[Foothold, ...], steps
     """
     middle = partial(_middle, stance, gait.numbers.get("ahead", 1.0), gait.numbers.get("inward", 0.0))
     begins, enter = [0.0], [0.5 * (middle(holds[0]) + middle(holds[1]))]
-    leave, leans = enter.copy(), gait.lateral == "lean"
-    stand = {hold.foot: hold for hold in holds[:2]}
-
-    def come(phase: float, *places: Array) -> None:
-        begins.append(phase)
+    leave, stand = enter.copy(), {hold.foot: hold for hold in holds[:2]}
+    for begin, foot, n in supports(gait, stance, steps)[1:]:
+        if not foot:
+            places = [0.5 * np.sum([middle(hold) for hold in stand.values()], axis=0)]
+        elif n is None:
+            places = [middle(stand[foot])]
+        else:
+            landing = holds[n + 2]
+            places = [middle(stand[foot], towards=o, by=gait.roll) for o in (stand[landing.foot], landing)]
+            stand[landing.foot] = landing
+        begins.append(begin)
         enter.append(places[0])
         leave.append(places[-1])
-
-    if leans:
-        come(0.5, middle(stand[stance.foot(swing_side(gait, 0)).name]))
-    for n in range(steps):
-        supporting = stand[stance.foot(-swing_side(gait, n)).name]
-        others = stand[holds[n + 2].foot], holds[n + 2]
-        come(n + 1.0, *(middle(supporting, towards=other, by=gait.roll) for other in others))
-        stand[holds[n + 2].foot] = holds[n + 2]
-    if leans:
-        come(steps + 1.0, middle(holds[-1]))
-    first, second = stand.values()
-    come(steps + (1.5 if leans else 1.0), 0.5 * (middle(first) + middle(second)))
     phase = time / gait.Tc - (gait.numbers.get("stand", 1.0) - 1)
     number = np.maximum(np.searchsorted(begins, phase + 1e-9, side="right") - 1, 0)
     dsp, gone = gait.numbers["dsp"], (phase - np.array(begins)[number])[:, None]

@@ -5,6 +5,9 @@ so that a waist that shifts would tilt the soles. Where the waist rolls about th
 these stay above their feet, and what is above them carries the CoM to either side. Where the line lies
 lower, the waist tilts: it shifts and rolls at once, and a hip carries what is above it on a shorter arm than
 where the waist only shifts.
+
+The hips come nearer to each other, seen from above, as the waist rolls. So that the sole that carries the
+weight stays level all the same, and does not stand on its edge, the waist also shifts to its side.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ import numpy as np
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import X, as_array, rotate
+from screwkin.gait.motion import Motion
 from screwkin.gait.plan import Plan
 from screwkin.gait.record import Gait
 from screwkin.kinematics.landmarks import limb_root, waist_frame
@@ -28,9 +32,12 @@ class Steering:
     Attributes:
         axis: base axes: rotation (3, 3) whose first column is the axis of the roll, and a point (3,) of it
             [m]; None where the waist shifts.
+        bearing: shares (T, feet) of the weight on soles that a shift keeps level; None where none does. With
+            them what moves has a third entry: to the left in m.
     """
 
     axis: tuple[Array, Array] | None = None
+    bearing: Motion | None = None
 
     @classmethod
     def of(cls, robot: Robot, gait: Gait) -> Steering:
@@ -50,9 +57,14 @@ class Steering:
             middle = middle - (height - gait.numbers.get("pivot", 0.0)) * up
         return cls((R, middle))
 
+    @property
+    def ways(self) -> int:
+        """How many entries what moves has."""
+        return 2 if self.bearing is None else 3
+
     def moved(self, planned: Plan, by: Array) -> Plan:
-        """The plan with its waist, and the hands that hang from it, moved (T, 2); hands do not roll."""
-        along = by if self.axis is None else by * (1, 0)
+        """The plan with its waist, and the hands that hang from it, moved (T, ways); hands do not roll."""
+        along = self._along(by)
         T = planned.T_world_base.copy()
         T[:, :2, 3] += along
         hands = {name: _added(p, along) for name, p in planned.hand_position.items()}
@@ -60,8 +72,8 @@ class Steering:
         return planned if self.axis is None else self._rolled(planned, by[:, 1])
 
     def driven(self, planned: Plan, velocity: Array, acceleration: Array) -> Plan:
-        """The plan with rates and accelerations (T, 2) added to waist and hands."""
-        v, a = (x if self.axis is None else x * (1, 0) for x in (velocity, acceleration))
+        """The plan with rates and accelerations (T, ways) added to waist and hands."""
+        v, a = self._along(velocity), self._along(acceleration)
         planned = replace(
             planned,
             base_twist=_added(planned.base_twist, v, 3),
@@ -69,7 +81,13 @@ class Steering:
             hand_velocity={name: _added(old, v) for name, old in planned.hand_velocity.items()},
             hand_acceleration={name: _added(old, a) for name, old in planned.hand_acceleration.items()},
         )
-        return planned if self.axis is None else self._spun(planned, velocity[:, 1:], acceleration[:, 1:])
+        return planned if self.axis is None else self._spun(planned, velocity[:, 1:2], acceleration[:, 1:2])
+
+    def _along(self, by: Array) -> Array:
+        """The part (T, 2) of what moves that is a shift."""
+        if self.axis is None:
+            return by
+        return by * (1, 0) if by.shape[-1] == 2 else by[:, [0, 2]]
 
     def _rolled(self, planned: Plan, angle: Array) -> Plan:
         """The base turned (T,) about the axis, which moves on as before."""
