@@ -115,19 +115,21 @@ def _closure_faults(closure: Mapping[str, tuple[float, float]]) -> Iterator[str]
 
 
 def _standing_faults(robot: Robot, trajectory: Trajectory) -> Iterator[str]:
-    """Soles in contact that are off the floor or move, and soles below the floor."""
+    """Soles in contact that are off the floor or move where they touch it, and soles below the floor."""
     terrain = ground_of(trajectory)
     for i, foot in enumerate(trajectory.feet):
         T, stands = trajectory.T_world_tip[foot], trajectory.contact[:, i]
         corners = np.einsum("tij,kj->tki", T[:, :3, :3], sole_corners(robot, foot)) + T[:, None, :3, 3]
         height = terrain.above_ground(corners)
-        floats = stands & ~(np.abs(height).max(axis=1) <= STANDS)
+        touches = np.abs(height) <= STANDS
+        floats = stands & ~touches.any(axis=1)
         if floats.any():
             yield f"{foot} is in contact but off the floor at {trajectory.time[int(floats.argmax())]:.2f} s"
         sunk = ~(height.min(axis=1) >= -STANDS)
         if sunk.any():
             yield f"{foot} is below the floor at {trajectory.time[int(sunk.argmax())]:.2f} s"
-        moved = np.abs(np.diff(corners, axis=0)).max(axis=(1, 2))
+        both = touches[1:] & touches[:-1]  # of a sole that turns about an edge, the ends of this edge
+        moved = np.where(both, np.abs(np.diff(corners, axis=0)).max(axis=2), 0.0).max(axis=1)
         slides = stands[1:] & stands[:-1] & ~(moved <= STANDS)
         if slides.any():
             yield f"{foot} moves while in contact, at {trajectory.time[int(slides.argmax())]:.2f} s"

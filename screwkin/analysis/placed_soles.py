@@ -31,11 +31,15 @@ def support_polygons(account: Account) -> list[tuple[int, int, Array]]:
 def support_phases(soles: Array, contact: NDArray[np.bool_]) -> list[tuple[int, int, Array]]:
     """First and last sample of every phase of support, and the corners (k, 2) of its polygon [m].
 
+    Another phase begins where a foot comes or leaves, or turns from its whole sole onto an edge of it.
+
     Args:
         soles: corners (T, feet, corners, 2) [m].
         contact: (T, feet) which of them stand.
     """
-    changed = np.flatnonzero((contact[1:] != contact[:-1]).any(axis=1)) + 1
+    doubled = (soles == np.roll(soles, 1, axis=2)).all(axis=-1).any(axis=-1) & contact
+    new = (contact[1:] != contact[:-1]) | (doubled[1:] != doubled[:-1])
+    changed = np.flatnonzero(new.any(axis=1)) + 1
     starts = [0, *changed.tolist()]
     ends = [*changed.tolist(), len(contact)]
     return [

@@ -218,8 +218,7 @@ def judged(
     """The verdict on a finished run, of compliant or rigid servos and soles."""
     compliance = (compliance or SimulatedCompliance()).for_trajectory(robot, trajectory)
     springs = compliance.servos.stiffness if compliance.servos is not None else None
-    legs = tuple(limb.tip for limb in robot.limbs if limb.kind == "leg")
-    zmp, slipped = zmp_record(run, trajectory), slip(run, trajectory, legs)
+    zmp, slipped = zmp_record(run, trajectory), slip(run, trajectory, robot)
     rms, largest = _deviation(zmp.contact - zmp.planned)
     ankle = None if _rods_end_at_feet(robot) else _deviation(zmp.ankle - zmp.contact)[0]
     last, planned = run.T_world_base[-1], trajectory.T_world_base

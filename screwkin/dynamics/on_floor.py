@@ -65,6 +65,35 @@ def soles_on_floor(
     )
 
 
+def pressed_points(
+    robot: Robot,
+    feet: tuple[str, ...],
+    T_world_tip: Mapping[str, Array],
+    terrain: Terrain = FLAT,
+) -> Array:
+    """Where soles that lean press on the floor, beside where they do when flat: (T, feet, 3), tip axes [m].
+
+    The middle of the corners less that of the sole. A corner counts in full up to ``TOUCH`` above the lowest
+    one, and no more from twice that, so the point moves without a jump. Zero where a sole is flat; where it
+    turns about one of its edges it stays on this edge.
+
+    Args:
+        robot: with soles.
+        feet: tips of the feet.
+        T_world_tip: their poses (T, 4, 4).
+        terrain: slope and blocks.
+    """
+    points = []
+    for foot in feet:
+        corners, T = sole_corners(robot, foot), T_world_tip[foot]
+        height = terrain.above_plane(np.einsum("tij,kj->tki", T[:, :3, :3], corners) + T[:, None, :3, 3])
+        rise = height - height.min(axis=1, keepdims=True)
+        share = np.clip(2.0 - rise / TOUCH, 0.0, 1.0)
+        pressed, flat = ((s @ corners) / s.sum(axis=1, keepdims=True) for s in (share, np.ones_like(share)))
+        points.append(pressed - flat)
+    return np.stack(points, axis=1)
+
+
 def ground_reaction(
     robot: Robot, T_world_base: Array, q: Array, qd: Array, qdd: Array, twist: Array, acceleration: Array
 ) -> tuple[Array, Array, Array, Array]:

@@ -147,9 +147,9 @@ def seen_from_above(account: Account) -> Figure:
 def draw_soles(axes: Axes, account: Account, soles: Array) -> None:
     """Outlines of the soles (T, feet, corners, 2) [m], once in every place where one stands."""
     for k, (foot, colour) in enumerate(foot_colours(account).items()):
-        for n, (begin, _) in enumerate(_placements(soles[:, k], account.trajectory.contact[:, k])):
+        for n, at in enumerate(_placements(soles[:, k], account.trajectory.contact[:, k])):
             label = f"{shown(foot)} on the floor" if n == 0 else None
-            corners = np.vstack([soles[begin, k], soles[begin, k, :1]])
+            corners = np.vstack([soles[at, k], soles[at, k, :1]])
             axes.plot(*corners.T, color=colour, linewidth=1.3, label=label)
 
 
@@ -158,12 +158,13 @@ def _different(polygons: Sequence[Array]) -> list[Array]:
     return list({tuple(np.sort(polygon.round(6), axis=0).ravel()): polygon for polygon in polygons}.values())
 
 
-def _placements(corners: Array, contact: Array) -> list[tuple[int, int]]:
-    """Spans of samples in which a sole stands in one place, each place once."""
-    places: list[tuple[int, int]] = []
+def _placements(corners: Array, contact: Array) -> list[int]:
+    """Samples amid the spans in which a sole stands in one place, each place once."""
+    places: list[int] = []
     for begin, end in spans(contact):
-        if not any(np.abs(corners[begin] - corners[other]).max() < 1e-6 for other, _ in places):
-            places.append((begin, end))
+        middle = (begin + end) // 2
+        if not any(np.abs(corners[middle] - corners[other]).max() < 1e-6 for other in places):
+            places.append(middle)
     return places
 
 

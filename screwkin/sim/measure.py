@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
+from screwkin.dynamics.on_floor import pressed_points
+from screwkin.gait.ground import ground_of
 from screwkin.kinematics.limits import limited_joints
 from screwkin.model.robot import Robot
 from screwkin.sim.run import Run
@@ -46,7 +48,7 @@ class ForceRecord:
 
 @dataclass(frozen=True)
 class Slip:
-    """Horizontal motion of soles that should stand still.
+    """Horizontal motion of soles that should stand still, or of the edges about which they turn.
 
     largest [m]: farthest a sole moves in the middle 80 % of one stance; total [m]: net motion of all whole
     stances added up; turned [rad]: largest change of a sole's heading in the middle of one stance.
@@ -92,22 +94,31 @@ def force_record(run: Run, window: float = WINDOW) -> ForceRecord:
     return ForceRecord(time[rows], force, torque)
 
 
-def slip(run: Run, trajectory: Trajectory, legs: tuple[str, ...]) -> Slip:
-    """How far soles move while the plan has them on the floor; ``legs`` names the run's feet.
+def slip(run: Run, trajectory: Trajectory, robot: Robot) -> Slip:
+    """How far soles move while the plan has them on the floor.
 
-    A foot stands between two samples if it stands at both.
+    A foot stands between two samples if it stands at both. As it turns about an edge its tip moves; what
+    counts is the motion of the sole where the plan has it press on the floor.
     """
+    legs = tuple(limb.tip for limb in robot.limbs if limb.kind == "leg")
     played = _before_fall(run) & (run.time >= trajectory.time[0]) & (run.time <= trajectory.time[-1])
     after = np.minimum(np.searchsorted(trajectory.time, run.time[played]), trajectory.samples - 1)
     standing = trajectory.contact & np.roll(trajectory.contact, 1, axis=0)
+    pressed = pressed_points(robot, legs, trajectory.T_world_tip, ground_of(trajectory))
     largest = total = turned = 0.0
     for i, foot in enumerate(legs):
         T = run.T_world_foot[played, i]
+        rolled = np.zeros((len(T), 2))
+        rolled[1:] = np.cumsum(
+            np.einsum("tij,tj->ti", np.diff(T[:, :2, :3], axis=0), pressed[after[1:], i]), 0
+        )
+        place = T[:, :2, 3] + rolled
         for first, last in _stretches(standing[after, trajectory.feet.index(foot)]):
-            total += float(np.linalg.norm(T[last - 1, :2, 3] - T[first, :2, 3]))
+            total += float(np.linalg.norm(place[last - 1] - place[first]))
             tenth = (last - first) // 10
-            middle = T[first + tenth : last - tenth]
-            away = np.linalg.norm(middle[:, :2, 3] - middle[0, :2, 3], axis=1)
+            rows = slice(first + tenth, last - tenth)
+            middle = T[rows]
+            away = np.linalg.norm(place[rows] - place[first + tenth], axis=1)
             heading = np.unwrap(np.arctan2(middle[:, 1, 0], middle[:, 0, 0]))
             largest = max(largest, float(away.max()))
             turned = max(turned, float(np.abs(heading - heading[0]).max()))

@@ -77,22 +77,24 @@ def test_the_record_ends_at_a_fall(run: Run, walk: Trajectory) -> None:
     assert len(zmp_record(replace(fallen, fallen_at=-0.49), walk).time) == 0
 
 
-def test_planned_feet_do_not_slip(run: Run, walk: Trajectory) -> None:
+def test_planned_feet_do_not_slip(run: Run, walk: Trajectory, robot: Robot) -> None:
     """The loops are closed at the samples; between them the joints' splines miss the feet by nanometres."""
-    measured = slip(run, walk, LEGS)
+    measured = slip(run, walk, robot)
     assert measured.largest < 1e-7
     assert measured.turned < 1e-9
     assert measured.total < 1e-7
 
 
-def test_a_stance_foot_that_drifts_slips_by_the_drift_of_its_middle(run: Run, walk: Trajectory) -> None:
+def test_a_stance_foot_that_drifts_slips_by_the_drift_of_its_middle(
+    run: Run, walk: Trajectory, robot: Robot
+) -> None:
     """The left foot bears from the start; it creeps forward evenly and turns through the whole walk."""
     T = run.T_world_foot.copy()
     share = np.clip(run.time / walk.duration, 0, 1)
     T[:, 1, 0, 3] += 0.020 * share
     angle = 0.1 * share
     T[:, 1, :2, 0] = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    measured = slip(replace(run, T_world_foot=T), walk, LEGS)
+    measured = slip(replace(run, T_world_foot=T), walk, robot)
     stance = walk.contact[:, walk.feet.index("left_foot")]
     ends = np.flatnonzero(np.diff(np.concatenate([[0], stance.astype(int), [0]])))
     longest = float(np.max((ends[1::2] - ends[::2]) * 0.02)) / walk.duration
