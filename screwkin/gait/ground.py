@@ -13,7 +13,7 @@ from screwkin.errors import InputError, NoSolutionError, TrajectoryError
 from screwkin.gait.footsteps import Foothold, listed_step
 from screwkin.gait.motion import Motion
 from screwkin.gait.record import Gait
-from screwkin.gait.soles import outlines, sole_distance
+from screwkin.gait.soles import outlines, sole_distance, underside
 from screwkin.gait.stance import Stance
 from screwkin.trajectory import Trajectory
 
@@ -67,7 +67,7 @@ def check_edges(
     Args:
         gait: for the message.
         stance: soles of the feet.
-        feet: x, y, z, yaw (T, 4) by name, in the floor's frame [m and rad].
+        feet: x, y, z, yaw (T, 4), or pitch too (T, 5), by name, in the floor's frame [m and rad].
         time: (T,) [s].
         terrain: blocks on the floor.
 
@@ -76,9 +76,10 @@ def check_edges(
     """
     for foot in stance.feet:
         motion = feet[foot.name]
-        soles = outlines(convex_hull(np.asarray(foot.sole, dtype=float)), motion)
+        sole = convex_hull(np.asarray(foot.sole, dtype=float))
+        soles, height = outlines(sole, motion), underside(sole, motion)
         for block in terrain.blocks:
-            low = np.flatnonzero(motion.value[:, 2] < block.top - _TOUCH)
+            low = np.flatnonzero(height < block.top - _TOUCH)
             if not len(low):
                 continue
             corners = np.broadcast_to(block.corners, (len(low), *block.corners.shape))
@@ -86,7 +87,7 @@ def check_edges(
             if gap.min() >= 0.0:
                 continue
             k = int(low[int(np.argmax(gap < 0.0))])
-            step, under = listed_step(gait, float(time[k])) + 1, 1e3 * (block.top - motion.value[k, 2])
+            step, under = listed_step(gait, float(time[k])) + 1, 1e3 * (block.top - height[k])
             where = f"the block at x {block.x:.4g}, y {block.y:.4g} m"
             raise NoSolutionError(
                 f"gait {gait.name}: {foot.name} meets the edge of {where} at {time[k]:.3f} s, {under:.1f} mm"

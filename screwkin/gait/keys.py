@@ -117,6 +117,18 @@ _OPTIONAL = {
         0.0,
         within="from 0 to 1",
     ),
+    "toe": Key(
+        "angle by which a foot that stands behind the other turns about its front edge before it leaves",
+        "rad",
+        0.0,
+        within="from 0 to 1",
+    ),
+    "heel": Key(
+        "angle by which a foot that lands ahead of the other has turned about its rear edge, toes up",
+        "rad",
+        0.0,
+        within="from 0 to 1",
+    ),
     "ease": Key(
         "part of an even swing in which it speeds up, and again slows down",
         "share",

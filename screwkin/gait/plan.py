@@ -16,8 +16,9 @@ from screwkin.errors import Fault, GaitError, InputError
 from screwkin.gait.footsteps import Foothold, feet_motion, footholds
 from screwkin.gait.ground import check_edges, planned_terrain
 from screwkin.gait.hands import hands_motion
-from screwkin.gait.motion import Motion, carried_frame, level_pose, level_twist
+from screwkin.gait.motion import Motion, carried_frame
 from screwkin.gait.path import path_of
+from screwkin.gait.pitch import foot_acceleration, foot_pose, foot_twist, pitched
 from screwkin.gait.record import Gait
 from screwkin.gait.soles import check_soles
 from screwkin.gait.stance import Stance
@@ -135,6 +136,7 @@ def plan_around(
     with np.errstate(all="ignore"):
         holds = footholds(gait, stance, steps)
         feet, contact = feet_motion(gait, stance, holds, phase)
+        feet = pitched(gait, stance, holds, phase, feet)
         hands = hands_motion(gait, stance, waist, phase, home)
     _check_finite(gait, {"waist": waist, **feet, **hands})
     with np.errstate(all="ignore"):
@@ -150,9 +152,9 @@ def plan_around(
         T_world_base=read_only(base[0]),
         base_twist=read_only(base[1]),
         base_acceleration=read_only(base[2]),
-        T_world_tip=_each(feet, lambda foot: level_pose(foot)),
-        tip_twist=_each(feet, lambda foot: level_twist(foot.rate)),
-        tip_acceleration=_each(feet, lambda foot: level_twist(foot.acceleration)),
+        T_world_tip=_each(feet, foot_pose),
+        tip_twist=_each(feet, foot_twist),
+        tip_acceleration=_each(feet, foot_acceleration),
         hand_position=_each(hands, lambda hand: hand.value),
         hand_velocity=_each(hands, lambda hand: hand.rate),
         hand_acceleration=_each(hands, lambda hand: hand.acceleration),

@@ -27,8 +27,10 @@ from screwkin.gait.footsteps import Foothold, footholds
 from screwkin.gait.lead import at_home, led, samples_of, share_of_home
 from screwkin.gait.motion import Motion
 from screwkin.gait.over_feet import headings, levels, waist_over
+from screwkin.gait.pitch import refuse_level_legs
 from screwkin.gait.plan import Plan, check_fitted, check_rate, plan_around, whole_steps
 from screwkin.gait.preview import CartMotion, follow_reference, preview_gains
+from screwkin.gait.realise import free_rotations
 from screwkin.gait.record import Gait
 from screwkin.gait.stance import Stance
 from screwkin.gait.steering import Steering
@@ -64,6 +66,7 @@ def preview_plan(mechanism: Mechanism, gait: Gait, stance: Stance, steps: int) -
         raise InputError(f"steps is {steps}; gait {gait.name} lists {len(gait.places)} footholds")
     settings = _settings(gait)
     check_rate(gait)
+    refuse_level_legs(gait, [foot.name for foot in stance.feet], free_rotations(mechanism))
     stand = settings["stand"]
     count, more = round((steps + 2 * stand) * gait.Tc * gait.rate), samples_of(gait)
     time = np.arange(count + 2 * more) / gait.rate

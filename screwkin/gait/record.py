@@ -50,9 +50,10 @@ class Gait:
     whether its waist ``shift``s to the side, or ``lean``s between the hips, as legs without a roll axis at
     the ankle need it to keep their soles flat, or does both, as it ``tilt``s about a line below the hips, at
     the number ``pivot`` above the floor. twist: share of the way by which the waist turns with each
-    step to where the hips are in line with the feet. swing: spline of a swing; ease: part of an ``even`` one
-    in which it speeds up, and again slows down. numbers: all of these and the file's own parameters.
-    channels: key points.
+    step to where the hips are in line with the feet. toe, heel: turn of a foot about the front edge of its
+    sole before it leaves, and about the rear edge, toes up, as it lands. swing: spline of a swing; ease: part
+    of an ``even`` one in which it speeds up, and again slows down. numbers: all of these and the file's own
+    parameters. channels: key points.
     waist: coefficients of a free waist path, or empty. places: where the steps of kind ``footsteps`` end.
     lengths: of the robot that it is fitted to [m]; empty before, when all that depends on them is NaN.
     """
@@ -90,6 +91,8 @@ class Gait:
     roll: float = 0.0
     lead: float = 0.0
     twist: float = 0.0
+    toe: float = 0.0
+    heel: float = 0.0
     ease: float = 0.25
     path: str = ""
     _document: Mapping[str, Any] = field(default_factory=dict, repr=False)

@@ -16,11 +16,21 @@ _TOUCH = 1e-9  # m: soles may touch
 
 
 def outlines(corners: Array, motion: Motion) -> Array:
-    """World corners (T, k, 2) of a sole (k, 2), carried by x, y, z, yaw (T, 4)."""
-    x, y, _, yaw = motion.value.T
+    """World corners (T, k, 2) of a sole (k, 2) seen from above, by x, y, z, yaw (T, 4), pitch (T, 5)."""
+    x, y, _, yaw = motion.value[:, :4].T
     c, n = np.cos(yaw), np.sin(yaw)
     R = np.stack([np.stack([c, -n], axis=-1), np.stack([n, c], axis=-1)], axis=-2)
+    if motion.value.shape[1] == 5:
+        R[:, :, 0] *= np.cos(motion.value[:, 4:])
     return np.asarray(np.einsum("tij,kj->tki", R, corners) + np.stack([x, y], axis=-1)[:, None])
+
+
+def underside(corners: Array, motion: Motion) -> Array:
+    """Height (T,) [m] of the lowest corner of a sole (k, 2), carried by x, y, z, yaw (T, 4), pitch (T, 5)."""
+    if motion.value.shape[1] == 4:
+        return motion.value[:, 2]
+    down = np.sin(motion.value[:, 4:]) * [corners[:, 0].min(), corners[:, 0].max()]
+    return np.asarray(motion.value[:, 2] - down.max(axis=1))
 
 
 def sole_distance(a: Array, b: Array) -> Array:
@@ -47,7 +57,7 @@ def check_soles(gait: Gait, stance: Stance, feet: dict[str, Motion], time: Array
     Args:
         gait: for the message.
         stance: soles and bodies of the feet.
-        feet: x, y, z, yaw (T, 4) by name [m and rad].
+        feet: x, y, z, yaw (T, 4), or pitch too (T, 5), by name [m and rad].
         time: (T,) [s].
 
     Raises:

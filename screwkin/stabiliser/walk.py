@@ -223,12 +223,14 @@ def stabilised(robot: Robot, trajectory: Trajectory, gains: Gains | None = None)
 
 
 def _check_kind(trajectory: Trajectory) -> None:
-    """Refuse gaits whose CoM moves otherwise than a pendulum's; what records no gait is taken for a plan."""
+    """Refuse gaits of other CoM than a pendulum's, or feet that pitch; what records no gait is a plan."""
     recorded = trajectory.meta.get("gait")
     table = recorded.get("gait") if isinstance(recorded, Mapping) else None
     kind = table.get("kind") if isinstance(table, Mapping) else None
     if kind is not None and kind not in KINDS:
         raise InputError(f"a stabiliser walks plans of gaits of kind {' or '.join(KINDS)}, not {kind}")
+    if turned := [key for key in ("toe", "heel") if isinstance(table, Mapping) and table.get(key, 0) != 0]:
+        raise InputError(f"a stabiliser keeps soles level; plan the walk with {' = '.join(turned)} = 0")
 
 
 def stabiliser_of(robot: Robot) -> Program:
