@@ -3,6 +3,7 @@
 On one foot the motion determines them. On two, forces between the feet are free to choose; here each foot
 carries its share of the load, and lies to its centre of pressure as both feet's balance point lies to the
 ZMP. So neither ankle twists against the other, and torques pass without a jump into those of single support.
+The balance point of a foot is its tip; of one that turns about an edge of its sole it is on this edge.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from screwkin.algebra.se3 import (
     vector_from_array,
 )
 from screwkin.dynamics.newton_euler import Bodies, wrench_and_efforts
-from screwkin.gait.loads import load_distribution
+from screwkin.gait.loads import balance_points, load_distribution
 from screwkin.kinematics.mass import GRAVITY
 from screwkin.model.robot import Robot
 from screwkin.trajectory import Trajectory
@@ -39,7 +40,8 @@ def walking_torques(robot: Robot, trajectory: Trajectory) -> Array:
     Raises:
         InputError: other than two feet, or a sample in which none is in contact.
     """
-    shares, batch = load_distribution(trajectory), (trajectory.samples,)
+    points = balance_points(robot, trajectory)
+    shares, batch = load_distribution(trajectory, points), (trajectory.samples,)
     bodies = Bodies.of(robot, pose_from_array(trajectory.T_world_base).R, unstack(trajectory.q))
     ground, free = wrench_and_efforts(
         bodies,
@@ -50,7 +52,7 @@ def walking_torques(robot: Robot, trajectory: Trajectory) -> Array:
         GRAVITY,
     )
     torque = np.array(as_array(free, batch))
-    places = [vector_from_array(trajectory.T_world_tip[foot][:, :3, 3]) for foot in trajectory.feet]
+    places = [vector_from_array(points[:, i]) for i in range(len(trajectory.feet))]
     for i, foot in enumerate(trajectory.feet):
         away = (places[i] - places[1 - i]) * shares[:, 1 - i]
         carried = Wrench(ground.m + cross(away, ground.f), ground.f) * shares[:, i]

@@ -12,10 +12,12 @@ from hypothesis import strategies as st
 
 import screwkin as sk
 from screwkin.analysis.consistency import motion_faults
-from screwkin.dynamics.on_floor import TOUCH, soles_on_floor
+from screwkin.dynamics.on_floor import TOUCH, pressed_points, soles_on_floor
 from screwkin.dynamics.support import sole_corners
 from screwkin.errors import GaitError, InputError
+from screwkin.gait.feed_forward import walking_torques
 from screwkin.gait.footsteps import feet_motion, footholds
+from screwkin.gait.loads import balance_points, load_distribution
 from screwkin.gait.motion import Motion
 from screwkin.gait.pitch import foot_acceleration, foot_pose, foot_twist, pitched, refuse_level_legs
 from screwkin.gait.soles import outlines, underside
@@ -158,6 +160,28 @@ def test_an_edge_that_slides_slips(walk: sk.Trajectory) -> None:
     rows = walk.contact[:, i] & (walk.T_world_tip["left_foot"][:, 2, 0] < -0.1)
     T[:, 1, 0, 3] += 0.01 * (run.time > walk.time[int(rows.argmax())])
     assert slip(replace(run, T_world_foot=T), walk, ROBOT).total == pytest.approx(0.01, abs=1e-4)
+
+
+def test_feet_that_turn_carry_their_load_on_their_edge(walk: sk.Trajectory) -> None:
+    """Balance points go there without a jump, and the load on them acts near the ZMP."""
+    points = balance_points(ROBOT, walk)
+    away = pressed_points(ROBOT, walk.feet, walk.T_world_tip)
+    for i, foot in enumerate(walk.feet):
+        T = walk.T_world_tip[foot]
+        own = np.einsum("tji,tj->ti", T[:, :3, :3], points[:, i] - T[:, :3, 3])
+        middle = 0.5 * sum(EDGES[foot])
+        turned = walk.contact[:, i] & (np.abs(T[:, 2, 0]) * (EDGES[foot][1] - EDGES[foot][0]) > 2.5 * TOUCH)
+        edge = np.where(T[turned, 2, 0] < 0, EDGES[foot][1], EDGES[foot][0])
+        assert own[turned, 0] == pytest.approx(edge - middle, abs=1e-9)
+        assert away[turned, i, 0] == pytest.approx(edge - middle, abs=1e-9)
+        stands = walk.contact[1:, i] & walk.contact[:-1, i]
+        assert np.abs(np.diff(own[:, 0]))[stands].max() < 0.01
+    shares = load_distribution(walk, points)
+    both = walk.contact.all(axis=1) & (shares.min(axis=1) > 0.05)
+    on_line = (shares[..., None] * points[..., :2]).sum(axis=1)
+    assert np.linalg.norm(on_line - walk.zmp, axis=1)[both].max() < 0.02
+    torque = walking_torques(ROBOT, walk)
+    assert np.abs(np.diff(torque, axis=0)).max() < 0.3 * np.abs(torque).max()
 
 
 def test_steps_that_go_no_way_ahead_stay_level_and_so_does_the_last_landing() -> None:
