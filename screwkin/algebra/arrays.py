@@ -24,3 +24,14 @@ def numpy_of(*arrays: object) -> Any:
     if jax is None or not any(isinstance(array, jax.Array) for array in arrays):
         return np
     return importlib.import_module("jax.numpy")
+
+
+def stretches(flags: Booleans) -> list[tuple[int, int]]:
+    """First and one-past-last index of every run of True.
+
+    Example:
+        >>> stretches(np.array([True, True, False, True]))
+        [(0, 2), (3, 4)]
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

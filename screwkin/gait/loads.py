@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from screwkin.algebra.arrays import Array
+from screwkin.algebra.arrays import Array, stretches
 from screwkin.dynamics.on_floor import pressed_points
 from screwkin.errors import InputError
 from screwkin.gait.ground import ground_of
@@ -31,7 +30,7 @@ def balance_points(robot: Robot, trajectory: Trajectory) -> Array:
     points = []
     for i, foot in enumerate(feet):
         leans = np.asarray(away[:, i].any(axis=1))
-        for start, end in _stretches(np.asarray(trajectory.contact.all(axis=1))):
+        for start, end in stretches(np.asarray(trajectory.contact.all(axis=1))):
             rows = np.arange(start, end)
             fixed = leans[rows] | np.isin(rows, (start, end - 1))
             if leans[rows].any():
@@ -69,7 +68,7 @@ def load_distribution(trajectory: Trajectory, places: Array | None = None) -> Ar
     first = np.where(trajectory.contact[:, 0], 1.0, 0.0)
     both = np.asarray(trajectory.contact.all(axis=1))
     raw = _towards_first(trajectory, places)
-    for start, end in _stretches(both):
+    for start, end in stretches(both):
         before = first[start - 1] if start > 0 else raw[start]
         after = first[end] if end < len(first) else raw[end - 1]
         way, span = raw[start:end] - raw[start], raw[end - 1] - raw[start]
@@ -87,9 +86,3 @@ def _towards_first(trajectory: Trajectory, places: Array | None) -> Array:
     line = a - b
     length = np.maximum((line**2).sum(axis=1), 1e-12)
     return np.clip(((trajectory.zmp - b) * line).sum(axis=1) / length, 0.0, 1.0)
-
-
-def _stretches(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and one-past-last index of every run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

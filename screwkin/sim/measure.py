@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from screwkin.algebra.arrays import Array
+from screwkin.algebra.arrays import Array, stretches
 from screwkin.dynamics.on_floor import pressed_points
 from screwkin.gait.ground import ground_of
 from screwkin.kinematics.limits import limited_joints
@@ -113,7 +113,7 @@ def slip(run: Run, trajectory: Trajectory, robot: Robot) -> Slip:
             np.einsum("tij,tj->ti", np.diff(T[:, :2, :3], axis=0), pressed[after[1:], i]), 0
         )
         place = T[:, :2, 3] + rolled
-        for first, last in _stretches(standing[after, trajectory.feet.index(foot)]):
+        for first, last in stretches(standing[after, trajectory.feet.index(foot)]):
             total += float(np.linalg.norm(place[last - 1] - place[first]))
             tenth = (last - first) // 10
             rows = slice(first + tenth, last - tenth)
@@ -142,7 +142,7 @@ def landing_leads(run: Run, trajectory: Trajectory, legs: tuple[str, ...]) -> Ar
     touches = force > 0.05 * np.median(force.sum(axis=1))
     leads = []
     for i, foot in enumerate(legs):
-        for first, last in _stretches(~trajectory.contact[:, trajectory.feet.index(foot)]):
+        for first, last in stretches(~trajectory.contact[:, trajectory.feet.index(foot)]):
             if first == 0 or last == trajectory.samples:
                 continue
             lift, land = trajectory.time[first - 1], trajectory.time[last]
@@ -189,9 +189,3 @@ def _zmp(wrench: Array) -> Array:
     """Point of the floor (K, 2) where a wrench about the world origin has no horizontal moment."""
     pressing = np.where(wrench[:, 5] > 1e-6, wrench[:, 5], np.nan)
     return np.stack([-wrench[:, 1] / pressing, wrench[:, 0] / pressing], axis=1)
-
-
-def _stretches(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
-    """First and one-past-last index of every run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
-    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))
