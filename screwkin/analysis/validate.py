@@ -34,7 +34,7 @@ from screwkin.kinematics.limits import limited_joints
 from screwkin.model.robot import Robot, robot_text
 from screwkin.sim.camera import Camera, Picture
 from screwkin.sim.feedback import Loop, Senses, WalkController
-from screwkin.sim.measure import Slip, ZmpRecord, slip, speed_use, torque_use, zmp_record
+from screwkin.sim.measure import Slip, ZmpRecord, slip, speed_use, torque_needed, torque_use, zmp_record
 from screwkin.sim.perturbation import NONE, Perturbation
 from screwkin.sim.render import pictures
 from screwkin.sim.run import Run, simulate
@@ -223,11 +223,14 @@ def judged(
     ankle = None if _rods_end_at_feet(robot) else _deviation(zmp.ankle - zmp.contact)[0]
     last, planned = run.T_world_base[-1], trajectory.T_world_base
     reached = _distance(trajectory.T_world_base[0], last)
-    torque, speed = torque_use(run, robot), speed_use(trajectory, robot)
+    torque, speed = torque_needed(run, robot, trajectory), speed_use(trajectory, robot)
     facts = Validation(
         passed=False,
         reasons=(),
-        warnings=_warnings(robot, trajectory, run, slipped, speed),
+        warnings=(
+            *_warnings(robot, trajectory, run, slipped, speed),
+            *_pressed(robot, run, torque, criteria.torque_share),
+        ),
         engine=run.engine,
         engine_settings={run.engine: dict(run.settings)},
         servo=run.servo,
@@ -321,6 +324,18 @@ def _warnings(robot: Robot, trajectory: Trajectory, run: Run, slipped: Slip, spe
     if slipped.turned > np.deg2rad(5.0):
         warnings.append(f"a stance foot turns by {np.rad2deg(slipped.turned):.1f} deg")
     return tuple(warnings)
+
+
+def _pressed(robot: Robot, run: Run, needed: Array, most: float) -> Iterator[str]:
+    """A word on servos at their limit only because rigid legs press against each other."""
+    used = torque_use(run, robot)
+    names = [
+        f"{name} {100 * share:.0f} % ({100 * least:.0f} % without)"
+        for name, share, least in zip(robot.joint_names, used, needed, strict=True)
+        if share > most >= least
+    ]
+    if names:
+        yield f"rigid legs press their feet against each other, which no motion needs: {', '.join(names)}"
 
 
 def _rods_end_at_feet(robot: Robot) -> bool:

@@ -51,7 +51,8 @@ class Measured:
     hold both, and ankle_rms_xy_mm the ankle sensors against the contacts; None where closures end at feet.
     engine: names of all engines, joined by ``+``; numbers are the worst of them. By the engine's name:
     engine_settings, engines: what each measured, and solver: what finer settings change, None if not tried.
-    undecided: the verdict lies within a solver's own scatter; it has not passed.
+    undecided: the verdict lies within a solver's own scatter; it has not passed. torque_use: of its limit, by
+    every motor, without what rigid legs press against each other while both stand.
     robot_sha256: of the table that was simulated. compensation: how the commands allow for elastic servos, or
     ``none``; servo: what moved the joints; joint_stiffness [N m/rad] and sole_stiffness [N/m]: of the
     simulated springs, None if rigid; repeated: runs under other conditions. self_collisions: along plan and

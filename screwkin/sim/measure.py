@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from screwkin.algebra.arrays import Array, stretches
+from screwkin.algebra.arrays import Array, Booleans, stretches
 from screwkin.dynamics.on_floor import pressed_points
 from screwkin.gait.ground import ground_of
 from screwkin.kinematics.limits import limited_joints
 from screwkin.model.robot import Robot
+from screwkin.model.state import State
+from screwkin.sim.internal_load import FEET, feet_held, legs_of, on_both, without_internal_load
 from screwkin.sim.run import Run
 from screwkin.trajectory import Trajectory
 
@@ -158,12 +159,46 @@ def torque_use(run: Run, robot: Robot, window: float = WINDOW) -> Array:
 
     The simulated motor never exceeds its limit; a share of 1 means that it could not follow for that long.
     """
+    return np.asarray(_most(_mean_torques(run, len(robot.joints), window)) / _limits(robot))
+
+
+def torque_needed(run: Run, robot: Robot, trajectory: Trajectory, window: float = WINDOW) -> Array:
+    """The same (n,) without what rigid servos make the feet press against each other while both stand.
+
+    It is less than ``torque_use`` for rigid servos alone, in robots that are trees with two legs, where both
+    feet carry and the commands keep one still against the other.
+    """
+    used = _mean_torques(run, len(robot.joints), window)
+    if run.servo != "rigid" or robot.closures or len(legs_of(robot)) != FEET or not len(used):
+        return np.asarray(_most(used) / _limits(robot))
     count = max(1, round(window / run.dt))
-    torque = np.abs(run.torque[_before_fall(run) & (run.time >= 0.0)])
-    if len(torque) < count:
-        return np.zeros(len(robot.joints))
-    limit = np.array([joint.effort for joint in robot.joints])
-    return np.asarray(_window_mean(torque, count).max(axis=0) / limit)
+    rows = _played(run)
+    wrenches, torque = (_window_mean(x[rows], count) for x in (run.ankle_wrench, run.torque))
+    middle = np.flatnonzero(rows)[count // 2 :][: len(used)]
+    sample = np.searchsorted(trajectory.time, run.time[middle]).clip(0, trajectory.samples - 1)
+    both = np.flatnonzero(on_both(wrenches) & feet_held(robot, trajectory)[sample])
+    state = State(run.T_world_base[middle[both]], run.q[middle[both]])
+    needed = without_internal_load(robot, state, torque[both], wrenches[both])
+    used[both] += np.minimum(np.abs(needed) - np.abs(torque[both]), 0.0)
+    return np.asarray(_most(used) / _limits(robot))
+
+
+def _mean_torques(run: Run, joints: int, window: float) -> Array:
+    """Window means (M, n) of the magnitudes of torques, from the trajectory's begin up to a fall."""
+    torque, count = np.abs(run.torque[_played(run)]), max(1, round(window / run.dt))
+    return _window_mean(torque, count) if len(torque) >= count else np.zeros((0, joints))
+
+
+def _most(torques: Array) -> Array:
+    return np.asarray(torques.max(axis=0, initial=0.0))
+
+
+def _limits(robot: Robot) -> Array:
+    return np.array([joint.effort for joint in robot.joints])
+
+
+def _played(run: Run) -> Booleans:
+    return np.asarray(_before_fall(run) & (run.time >= 0.0))
 
 
 def speed_use(trajectory: Trajectory, robot: Robot) -> Array:
@@ -173,7 +208,7 @@ def speed_use(trajectory: Trajectory, robot: Robot) -> Array:
     )
 
 
-def _before_fall(run: Run) -> NDArray[np.bool_]:
+def _before_fall(run: Run) -> Booleans:
     if run.fallen_at is None:
         return np.ones(len(run.time), dtype=bool)
     return np.asarray(run.time < run.fallen_at)
