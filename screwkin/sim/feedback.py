@@ -7,6 +7,7 @@ from dataclasses import asdict
 from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import Z, as_array, rotate, rotation_exp, vector_from_array
@@ -40,6 +41,11 @@ class Controller(Protocol):
 
     def answer(self, felt: Felt) -> Array:
         """Joint positions (n,) to be reached a cycle later."""
+        ...
+
+    @property
+    def contact(self) -> NDArray[np.bool_]:
+        """Feet (feet,) that stand as the last answer is reached, in the order of the robot's legs."""
         ...
 
 
@@ -76,6 +82,13 @@ class WalkController:
         self.deviation = np.zeros_like(self.course.q)
         self._last = np.clip(self.course.q + self._allowed[0], self._low, self._high)
         return self._last
+
+    @property
+    def contact(self) -> NDArray[np.bool_]:
+        """Feet (feet,) that stand as the last answer is reached, in the order of the robot's legs."""
+        legs = [limb.tip for limb in self.walk.body.robot.limbs if limb.kind == "leg"]
+        swings = self.walk.swings(self.course)
+        return np.array([tip != swings for tip in legs])
 
     def answer(self, felt: Felt) -> Array:
         """The next cycle's command."""
@@ -139,6 +152,9 @@ class Loop:
         self._goal = controller.reset()
         self._rate = np.zeros_like(self._goal)
         self._left = 0
+        self._newest = controller.contact
+        self.contact = self._newest
+        """Feet (feet,) bool that stand from the goal before to the newest."""
 
     def noted(self) -> dict[str, Any]:
         """The controller's settings, for a run's."""
@@ -150,6 +166,8 @@ class Loop:
         if self._left == 0:
             goal = self.controller.answer(self._senses.feel(seen, period))
             self._rate, self._goal, self._left = (goal - self._goal) / period, goal, round(period / dt)
+            before, self._newest = self._newest, self.controller.contact
+            self.contact = before & self._newest
         q = self._goal - self._left * dt * self._rate
         self._left -= 1
         return q, self._rate

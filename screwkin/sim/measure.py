@@ -96,25 +96,29 @@ def force_record(run: Run, window: float = WINDOW) -> ForceRecord:
 
 
 def slip(run: Run, trajectory: Trajectory, robot: Robot) -> Slip:
-    """How far soles move while the plan has them on the floor.
+    """How far soles move while they should stand still.
 
-    A foot stands between two samples if it stands at both. As it turns about an edge its tip moves; what
-    counts is the motion of the sole where the plan has it press on the floor.
+    They should where a controller has them flat on the floor, which takes steps sooner or later than planned;
+    without one where the plan has them there at both samples around. As a foot turns about an edge its tip
+    moves; what counts is the motion of the sole where the plan has it press on the floor.
     """
     legs = tuple(limb.tip for limb in robot.limbs if limb.kind == "leg")
     played = _before_fall(run) & (run.time >= trajectory.time[0]) & (run.time <= trajectory.time[-1])
-    after = np.minimum(np.searchsorted(trajectory.time, run.time[played]), trajectory.samples - 1)
-    standing = trajectory.contact & np.roll(trajectory.contact, 1, axis=0)
-    pressed = pressed_points(robot, legs, trajectory.T_world_tip, ground_of(trajectory))
+    if run.contact is None:
+        after = np.minimum(np.searchsorted(trajectory.time, run.time[played]), trajectory.samples - 1)
+        both = trajectory.contact & np.roll(trajectory.contact, 1, axis=0)
+        standing = both[after][:, [trajectory.feet.index(foot) for foot in legs]]
+        pressed = pressed_points(robot, legs, trajectory.T_world_tip, ground_of(trajectory))[after]
+    else:
+        standing = run.contact[played]
+        pressed = np.zeros((*standing.shape, 3))
     largest = total = turned = 0.0
-    for i, foot in enumerate(legs):
+    for i in range(len(legs)):
         T = run.T_world_foot[played, i]
         rolled = np.zeros((len(T), 2))
-        rolled[1:] = np.cumsum(
-            np.einsum("tij,tj->ti", np.diff(T[:, :2, :3], axis=0), pressed[after[1:], i]), 0
-        )
+        rolled[1:] = np.cumsum(np.einsum("tij,tj->ti", np.diff(T[:, :2, :3], axis=0), pressed[1:, i]), 0)
         place = T[:, :2, 3] + rolled
-        for first, last in stretches(standing[after, trajectory.feet.index(foot)]):
+        for first, last in stretches(standing[:, i]):
             total += float(np.linalg.norm(place[last - 1] - place[first]))
             tenth = (last - first) // 10
             rows = slice(first + tenth, last - tenth)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import as_array
@@ -49,7 +50,8 @@ class Run:
     q_planned, q, qd, torque (K, n); T_world_foot (K, feet, 4, 4); ground_wrench (K, 6): [m; f] of all
     contacts about the world origin; foot_force (K, feet, 3) of the contacts of the legs' last links, of feet
     that closures hold on the floor by their ankles' sensors;
-    ankle_wrench (K, feet, 6): ground wrench by the ankle sensors; touched: other links that met the floor;
+    ankle_wrench (K, feet, 6): ground wrench by the ankle sensors; contact (K, feet) bool: where a controller
+    has its feet on the floor, None where the plan says so; touched: other links that met the floor;
     fallen_at [s], None if it stood to the end.
     """
 
@@ -68,6 +70,7 @@ class Run:
     ground_wrench: Array
     foot_force: Array
     ankle_wrench: Array
+    contact: NDArray[np.bool_] | None
     touched: tuple[str, ...]
     fallen_at: float | None
 
@@ -116,11 +119,14 @@ def simulate(
     low = rule.fallen_height * terrain.above_plane(_carried(planned, watched))
     upright = math.cos(rule.fallen_tilt)
     seen: list[Observation] = []
+    contact: list[NDArray[np.bool_]] = []
     fallen_at: float | None = None
     for k in range(count):
         force = perturbation.force(float(times[k]), dt)
         if loop is not None and since - 1e-9 <= times[k]:
             q[k], qd[k] = loop.command(seen[-1] if seen else first, dt)
+        if loop is not None:
+            contact.append(loop.contact)
         backend.step(Command(q[k], qd[k], planned[k + 1], force))
         seen.append(backend.observe())
         now = float(times[k + 1])
@@ -141,6 +147,7 @@ def simulate(
         time=times[1 : rows + 1],
         planned_base=planned[1 : rows + 1],
         q_planned=q[1 : rows + 1],
+        contact=np.array(contact) if contact else None,
         fallen_at=fallen_at,
         **_columns(robot, seen),
     )

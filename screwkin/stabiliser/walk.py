@@ -147,6 +147,12 @@ class StabilisedWalk:
             "feedback": np.array([float(feedback)]),
         }
 
+    def swings(self, course: StabilisedState) -> str | None:
+        """Tip of the foot that is in the air as a course's command is reached."""
+        mode, tau, _, side = course.memory[:4].tolist()
+        aloft = mode == STEPPING and tau - float(self.rhythm.dt) > float(self.rhythm.both) + 1e-9
+        return (self.body.tips[0] if side > 0.0 else self.body.tips[1]) if aloft else None
+
     def phase(self, course: StabilisedState) -> int:
         """The plan's cycle in which a course is, whose steps may last longer or shorter than planned."""
         mode, tau, period = course.memory[:3].tolist()

@@ -15,9 +15,11 @@ from screwkin.errors import InputError
 from screwkin.kinematics.limits import limited_joints, limits_of
 from screwkin.model.robot import Robot
 from screwkin.sim.backend import Contact, Observation
-from screwkin.sim.feedback import Senses, WalkController
+from screwkin.sim.feedback import Loop, Senses, WalkController
+from screwkin.sim.kinematic import KinematicBackend
 from screwkin.sim.perturbation import NONE, Perturbation
 from screwkin.sim.perturbation_files import perturbation_from_texts
+from screwkin.sim.run import simulate
 from screwkin.stabiliser.walk import Felt, stabilised
 
 FEET = ("right_foot", "left_foot")
@@ -122,3 +124,27 @@ def test_whatever_is_felt_commands_keep_to_limits_and_speeds(robot: Robot) -> No
     assert (rates <= speeds * (1 + 1e-9)).all()
     assert rates.max() == pytest.approx(speeds.max())  # it was at its limit
     assert max(controller.settings["deviation"].values()) > 0.1
+
+
+def test_feet_that_a_controller_has_in_the_air_are_off_the_floor_and_no_others(robot: Robot) -> None:
+    """Where joints follow exactly: a foot is lifted or moved on only while it is said not to stand."""
+    gait = sk.load_gait("preview").replace(Tc=0.4, stride=0.08, lift=0.012, lead=0.6, horizon=1.0)
+    plan = sk.walk(robot, gait, steps=3)
+    walk = stabilised(robot, plan)
+    loop = Loop(WalkController(walk, feedback=False), Senses(robot, NONE, walk.body.tips))
+    run = simulate(robot, plan, KinematicBackend(robot, dt=0.005), loop=loop)
+    assert run.contact is not None
+    q_before = np.vstack([run.q[:1], run.q[:-1]])
+    states = [sk.State(np.tile(np.eye(4), (len(q), 1, 1)), q) for q in (q_before, run.q)]
+    for i, tip in enumerate(FEET):
+        swings, other = ~run.contact[:, i], FEET[1 - i]
+        assert not (swings & ~run.contact[:, 1 - i]).any()
+        a, b = (
+            np.linalg.inv(sk.frame_pose(robot, state, other)) @ sk.frame_pose(robot, state, tip)
+            for state in states
+        )
+        moves = np.abs(a - b).max(axis=(1, 2)) > 2e-4
+        both = run.contact.all(axis=1)
+        assert moves[swings].mean() > 0.9
+        assert not (moves & both).any()
+    assert len(np.flatnonzero(np.diff((~run.contact.all(axis=1)).astype(int)) == 1)) == 3

@@ -103,6 +103,20 @@ def test_a_stance_foot_that_drifts_slips_by_the_drift_of_its_middle(
     assert measured.total == pytest.approx(0.020 * stance.mean(), rel=0.05)
 
 
+@pytest.mark.parametrize("later", [1.0, -1.0])
+def test_steps_that_a_controller_takes_later_or_sooner_do_not_slip(
+    run: Run, walk: Trajectory, robot: Robot, later: float
+) -> None:
+    """Feet stand as planned, but all of it later: by the plan's contact they would slip, by their own not."""
+    rows = np.clip(np.arange(len(run.time)) - round(later / run.dt), 0, len(run.time) - 1)
+    after = np.minimum(np.searchsorted(walk.time, run.time), walk.samples - 1)
+    both = walk.contact & np.roll(walk.contact, 1, axis=0)
+    contact = both[after][:, [walk.feet.index(foot) for foot in LEGS]]
+    moved = replace(run, T_world_foot=run.T_world_foot[rows])
+    assert slip(moved, walk, robot).largest > 0.01
+    assert slip(replace(moved, contact=contact[rows]), walk, robot).largest < 1e-7
+
+
 def test_torque_use_is_the_worst_mean_of_a_window_after_settling(run: Run, robot: Robot) -> None:
     torque = np.zeros((len(run.time), len(robot.joints)))
     torque[run.time < 0, 3] = 9.0
