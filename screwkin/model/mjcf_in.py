@@ -21,7 +21,7 @@ from screwkin.algebra.arrays import Array
 from screwkin.algebra.se3 import IDENTITY, Pose, pose_from_array
 from screwkin.errors import Fault, TableError, UnknownNameError, needed_for
 from screwkin.model.mesh_files import find_mesh
-from screwkin.model.mjcf_loops import is_loop, with_loops
+from screwkin.model.mjcf_loops import base_body, is_loop, with_loops
 from screwkin.model.mjcf_size import check_size
 from screwkin.model.mjcf_springs import with_model_springs
 from screwkin.model.records import FLOOR, Posture
@@ -51,7 +51,7 @@ def is_mjcf(text: str) -> bool:
 
 
 def parse_mjcf(text: str, path: str = "<text>", repair: bool = False) -> UrdfRobot:
-    """The robot of an MJCF text; its base is floating if its one body on the ground has a free joint.
+    """The robot of an MJCF text; its base floats if its one body on the ground has a free joint.
 
     Args:
         text: XML.
@@ -89,7 +89,7 @@ def parse_mjcf(text: str, path: str = "<text>", repair: bool = False) -> UrdfRob
     robot = replace(
         read.robot,
         source=f"MJCF {Path(path).name}",
-        postures=tuple(_postures(model, read, notes)),
+        postures=tuple(_postures(mujoco, model, read.robot, notes)),
         text="",
     )
     robot = with_model_springs(model, robot, writer.note)
@@ -303,6 +303,9 @@ class _Writer:
             c = model.eq_data[e][:5]
             if is_loop(model, e):
                 continue
+            if not model.eq_active0[e]:
+                self.note("not active, left out", name)
+                continue
             if model.eq_type[e] != _JOINT_EQUALITY or two < 0 or np.abs(c[2:]).max() > _MOTIONLESS:
                 self.note("left out, add a [[closure]] or mimic for it", name)
                 continue
@@ -310,11 +313,10 @@ class _Writer:
             yield one, (self._joint_name(two), float(c[1]), refs[0] + float(c[0]) - float(c[1]) * refs[1])
 
 
-def _postures(model: Any, read: UrdfRobot, notes: dict[str, list[str]]) -> Iterator[Posture]:
+def _postures(mujoco: Any, model: Any, robot: Robot, notes: dict[str, list[str]]) -> Iterator[Posture]:
     """Keyframes within the limits, the base as high as they say."""
-    robot = read.robot
     at = {model.joint(j).name or f"joint_{j}": int(model.jnt_qposadr[j]) for j in range(model.njnt)}
-    free = next((int(model.jnt_qposadr[j]) for j in range(model.njnt) if model.jnt_type[j] == _FREE), None)
+    data = mujoco.MjData(model)
     for k in range(model.nkey):
         qpos, name = model.key_qpos[k], model.key(k).name or f"key_{k}"
         if not all(joint.name in at for joint in robot.joints):
@@ -322,9 +324,19 @@ def _postures(model: Any, read: UrdfRobot, notes: dict[str, list[str]]) -> Itera
             continue
         q = tuple(float(qpos[at[joint.name]]) for joint in robot.joints)
         if all(joint.lower <= x <= joint.upper for joint, x in zip(robot.joints, q, strict=True)):
-            yield Posture(name, 0.0 if free is None else float(qpos[free + 2]), q)
+            data.qpos[:] = qpos
+            mujoco.mj_kinematics(model, data)
+            yield Posture(name, _height(model, data, robot), q)
         else:
             notes.setdefault("keyframes beyond limits, left out", []).append(name)
+
+
+def _height(model: Any, data: Any, robot: Robot) -> float:
+    """Of a floating base over the ground: of the place that its last joint turns about."""
+    if robot.base == "fixed":
+        return 0.0
+    body = base_body(model, robot)
+    return float(data.xanchor[model.body_jntadr[body] + model.body_jntnum[body] - 1][2])
 
 
 def _matrix(p: Array, R: Array) -> Array:

@@ -14,6 +14,7 @@ from screwkin.algebra.se3 import UNTURNED, ZERO, Pose, Vector, as_array, pose_fr
 from screwkin.model.mjcf_springs import turned_joints
 from screwkin.model.records import FLOOR, Closure, Inertia, Joint, Link, Posture
 from screwkin.model.robot import Robot
+from screwkin.model.urdf_xml import plain_name
 
 _CONNECT, _WELD = 0, 1  # mjtEq
 _SITE = 6  # mjtObj
@@ -41,8 +42,8 @@ class _Loop:
 
 
 def is_loop(model: Any, e: int) -> bool:
-    """Whether an equality of a model closes a loop."""
-    return int(model.eq_type[e]) in (_CONNECT, _WELD)
+    """Whether an equality of a model closes a loop, and does from the start on."""
+    return int(model.eq_type[e]) in (_CONNECT, _WELD) and bool(model.eq_active0[e])
 
 
 def with_loops(
@@ -64,7 +65,7 @@ def with_loops(
         place: link and zero pose, in base axes, of a body by its number; None of bodies that are left out.
         note: takes a remark and what it is about.
     """
-    base = _base(mujoco, model)
+    base: Array = _bodies(mujoco, model)[1][base_body(model, robot)]
     closures, joints, loops = list[Closure](), list[Joint](), list[_Loop]()
     for loop in _loops(model):
         ends = [place(end.body) for end in loop.ends]
@@ -155,11 +156,10 @@ def _bodies(mujoco: Any, model: Any, qpos: Array | None = None) -> tuple[Array, 
     return data.xpos.copy(), data.xmat.reshape(-1, 3, 3).copy()
 
 
-def _base(mujoco: Any, model: Any) -> Array:
-    """Rotation (3, 3) of the base in the zero pose."""
-    free = [int(model.jnt_bodyid[j]) for j in range(model.njnt) if model.jnt_type[j] == _FREE]
-    rotation: Array = _bodies(mujoco, model)[1][free[0] if free else 0]
-    return rotation
+def base_body(model: Any, robot: Robot) -> int:
+    """The number of the body that a table's base link was made of; 0, the world's, of a fixed base."""
+    names = {plain_name(model.body(b).name or f"body_{b}"): b for b in range(1, model.nbody)}
+    return names[robot.base_link] if robot.base == "floating" else 0
 
 
 def _turned(R: Array) -> Array:

@@ -113,11 +113,13 @@ def parse_urdf(
     _note_left_out(reader, root, joints)
     joints, couplings = couplings_of(reader, joints, mimic)
     free = free_root(links, joints, base)
-    if free is not None:
-        reader.note("floating joint at the root, read as the floating base", free.name)
-        joints.remove(free)
-        del links[base]
-        base = free.child
+    if free:
+        what = "floating joint" if free[-1].type == "floating" else "six joints from a place to all else"
+        reader.note(f"{what} at the root, read as the floating base", ", ".join(edge.name for edge in free))
+        base = free[-1].child
+        for edge in free:
+            joints.remove(edge)
+            del links[edge.parent]
     links, joints = decomposed(reader, links, joints)
     names, shapes = _unique_names(reader, links, base), shape_reader(reader, root, Path(path).parent)
     bodies = _bodies(base, joints, names)
@@ -142,7 +144,7 @@ def parse_urdf(
         name=plain_name(root.get("name", "") or "robot"),
         description="",
         source=f"URDF {Path(path).name}{repaired}",
-        base="fixed" if base == "world" and free is None else "floating",
+        base="fixed" if base == "world" and not free else "floating",
         base_link=names[base],
         links=tuple(parts),
         frames=_frames(whole, names),
@@ -153,7 +155,9 @@ def parse_urdf(
         raise TableError(path, reader.faults)
     if srdf is not None:
         robot = _beside(reader, robot, srdf)
-    lost = () if robot.limbs else ("URDF names no limbs, soles and postures: add those that the robot has",)
+    lost = (
+        () if robot.limbs else ("the file names no limbs, soles and postures: add those that the robot has",)
+    )
     return UrdfRobot(Robot.from_text(robot_toml(robot), path), (*reader.remarks, *lost))
 
 

@@ -9,6 +9,8 @@ from typing import Literal, get_args
 from xml.etree.ElementTree import Element as NewElement
 from xml.etree.ElementTree import SubElement
 
+import numpy as np
+
 from screwkin.algebra.scalar import structural
 from screwkin.algebra.screws import INFINITE, Screw, displacement
 from screwkin.algebra.se3 import (
@@ -21,6 +23,7 @@ from screwkin.algebra.se3 import (
     X,
     Y,
     Z,
+    as_array,
     rotate,
     rotation_exp,
 )
@@ -37,13 +40,36 @@ _PARTS: Mapping[str, tuple[str, ...]] = {
 }
 _AXES = {"x": X, "y": Y, "z": Z}
 _EMPTY = ("inertial", "visual", "collision")
+_SPANNING = 0.1
+"""Least volume between three unit axes that move a body in every direction; at right angles it is 1."""
 
 
-def free_root(links: Mapping[str, Element], joints: Sequence[Edge], root: str) -> Edge | None:
-    """The floating joint by which a root that is only a place, as ``world`` is, carries the whole robot."""
-    below = [edge for edge in joints if edge.parent == root]
-    bare = all(links[root].find(tag) is None for tag in _EMPTY)
-    return below[0] if bare and len(below) == 1 and below[0].type == "floating" else None
+def free_root(links: Mapping[str, Element], joints: Sequence[Edge], root: str) -> list[Edge]:
+    """The joints by which a root that is only a place, as ``world`` is, carries the whole robot freely.
+
+    A floating joint, or three that slide and three that turn in a row, along and about axes that span space,
+    with nothing but places between them; fixed joints among these. None where the root is the robot's own.
+    """
+    row, place, slides, turns = list[Edge](), root, list[Vector](), list[Vector]()
+    turned: Rotation = UNTURNED
+    while all(links[place].find(tag) is None for tag in _EMPTY):
+        below = [edge for edge in joints if edge.parent == place]
+        if len(below) != 1:
+            return []
+        (edge,) = below
+        row.append(edge)
+        place, turned = edge.child, turned @ edge.origin.R
+        if edge.type == "floating":
+            return row
+        if edge.type != "fixed":
+            (slides if edge.type == "prismatic" else turns).append(turned @ edge.axis)
+        if len(slides) == len(turns) == len(_AXES):
+            return row if min(map(_volume, (slides, turns))) > _SPANNING else []
+    return []
+
+
+def _volume(axes: Sequence[Vector]) -> float:
+    return abs(float(np.linalg.det(np.array([as_array(axis) for axis in axes], dtype=float))))
 
 
 def decomposed(

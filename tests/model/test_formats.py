@@ -22,7 +22,7 @@ POPPY = load_robot("poppy12")
 def test_a_urdf_file_is_read_with_a_warning_of_what_it_cannot_say(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"biped{suffix}"
     path.write_text(urdf_from_robot(POPPY))
-    with pytest.warns(UserWarning, match=r"biped.*URDF names no limbs") as caught:
+    with pytest.warns(UserWarning, match=r"biped.*the file names no limbs") as caught:
         robot = load_robot(path)
     assert caught[0].filename == __file__
     assert robot.joint_names == POPPY.joint_names

@@ -146,3 +146,46 @@ def test_urdf_under_the_suffix_of_mjcf_is_read_as_urdf():
 def test_what_no_table_can_hold_is_refused(text, fault):
     with pytest.raises(TableError, match=fault):
         parse_mjcf(text)
+
+
+SIX = """<joint name="sx" type="slide" axis="1 0 0"/><joint name="sz" type="slide" axis="0 .6 .8"/>
+    <joint name="sy" type="slide" axis="0 1 0"/><joint name="tilt" axis="0 1 0"/>
+    <joint name="list" axis="1 0 0"/><joint name="turn" axis="0 0 1"/>"""
+
+
+def floats(root: str, key: str) -> sk.Robot:
+    """The walker, without what is no matter here, on such a root."""
+    text = WALKER.replace("<freejoint/>", root).replace("0 0 0.75 1 0 0 0", key)
+    text = text.replace('<mesh name="tetra" file="tetra.obj" scale="0.1 0.2 0.3"/>', "").replace(
+        'type="mesh" mesh="tetra"', 'type="box" size="1 1 1" mass="0"'
+    )
+    return parse_mjcf(text).robot
+
+
+def test_three_slides_and_three_turns_without_mass_are_a_floating_base():
+    free, six = floats("<freejoint/>", "0 0 0.75 1 0 0 0"), floats(SIX, "0.2 -0.0625 0 0 0 0")
+    assert (six.base, six.base_link, six.joint_names) == (free.base, free.base_link, free.joint_names)
+    state, still = sk.State(np.eye(4), np.array([0.3, -0.5, 0.2])), np.zeros(3)
+    for link in free.link_names:
+        np.testing.assert_allclose(
+            sk.frame_pose(six, state, link), sk.frame_pose(free, state, link), atol=1e-12
+        )
+    wrench = [sk.inverse_dynamics(robot, state, still, still) for robot in (six, free)]
+    np.testing.assert_allclose(*wrench, atol=1e-10)
+    (home,) = six.postures
+    assert home.q == free.postures[0].q
+    assert home.base_height == pytest.approx(0.75, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    "root",
+    [
+        SIX.replace("0 .6 .8", "1 .01 0"),  # slides in a plane
+        SIX.replace('<joint name="turn" axis="0 0 1"/>', ""),
+        SIX.replace('name="sy" type="slide"', 'name="sy"'),
+    ],
+)
+def test_joints_that_do_not_free_a_body_stay(root):
+    robot = floats(root, " ".join(["0"] * root.count("<joint")))
+    assert robot.base == "fixed"
+    assert len(robot.joints) == 3 + root.count("<joint")

@@ -110,3 +110,11 @@ def test_equalities_of_bodies_hold_what_is_together_at_qpos0(kind: str) -> None:
             data.qpos[model.joint(name).qposadr[0]] = closed.state.q[robot.joint_names.index(name)]
         mujoco.mj_forward(model, data)
         assert np.abs(data.efc_pos[: data.ne]).max() < 1e-9
+
+
+def test_what_is_not_active_holds_nothing() -> None:
+    own = '<weld name="loop" body1="coupler" body2="rocker" active="false"/>'
+    coupling = '<joint name="pair" joint1="rocker" joint2="crank" polycoef="0 1 0 0 0" active="false"/>'
+    read = parse_mjcf(text(own + coupling, False))
+    assert (read.robot.closures, read.robot.coupled) == ((), ())
+    assert "not active, left out: loop, pair" in read.remarks

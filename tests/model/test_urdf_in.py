@@ -117,7 +117,7 @@ def test_what_cannot_be_kept_is_told():
         "renamed, as a table needs plain names: 'tool tip' to tool_tip",
         "mesh files not found, so neither seen nor measured: a.stl",
         "velocity not above 0, taken as no limit: shoulder",
-        "URDF names no limbs, soles and postures",
+        "the file names no limbs, soles and postures",
     ):
         assert remark in told
 
