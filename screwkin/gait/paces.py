@@ -2,7 +2,8 @@
 
 Ankles are spared from the start: the ZMP keeps as near to them as their torque asks for. Soles that would
 touch at home are set apart. Legs without a roll axis at the ankle lean (``gait.steering``), as a waist that
-shifts would tilt their soles. Where the usual pace will not do, these follow:
+shifts would tilt their soles, and the ZMP of all links is led, as no ankle rights a sole that tips. Where the
+usual pace will not do, these follow:
 
 - of legs that lean, quicker steps, the ZMP nearer to the ankles, then on the inner half of the soles;
 - slower steps, for quick joints, and quicker ones, which need less sway;
@@ -67,6 +68,8 @@ SOLE_GAP = 0.02
 """Least gap between the feet, in leg lengths."""
 STANDING_SHARE = 0.3
 """Share of an ankle's torque with which it carries the robot on one foot."""
+EXACT = 1e-8
+"""Weight of changes of the jerk where no ankle rights a sole that tips: the ZMP is to be where it should."""
 LEAST_AHEAD = 0.3
 """How far ahead of the ankles the ZMP goes at least, by the middle of the sole."""
 _LATERAL = 0.7
@@ -107,7 +110,9 @@ def usual_pace(robot: Robot) -> Gait:
         gait = gait.replace(spread=f"{apart:.4g}*leg")
     if ahead < 1:
         gait = gait.replace(ahead=ahead)
-    return _leaning(gait, LEANING[0]) if _without_ankle_roll(robot) else gait.replace(period=PERIODS[0])
+    if _without_ankle_roll(robot):
+        return _leaning(gait.replace(model="links", R=EXACT), LEANING[0])
+    return gait.replace(period=PERIODS[0])
 
 
 def other_paces(robot: Robot, usual: Gait) -> Iterator[Gait]:
@@ -117,15 +122,13 @@ def other_paces(robot: Robot, usual: Gait) -> Iterator[Gait]:
         robot: with legs, soles and a ``home`` posture.
         usual: from ``usual_pace``.
     """
-    upright = usual.replace(lateral="shift", stand=1, period=PERIODS[0])
     if _without_ankle_roll(robot):
         yield from (_leaning(usual, period) for period in LEANING[1:])
         if usual.numbers["ahead"] > LEAST_AHEAD:
             yield from (_leaning(usual.replace(ahead=LEAST_AHEAD), period) for period in LEANING)
         yield from (_leaning(usual.replace(inward=INWARD), period) for period in LEANING)
-        yield upright
-        yield from (_quick(upright, period) for period in QUICK_PERIODS)
         return
+    upright = usual.replace(lateral="shift", stand=1, period=PERIODS[0])
     yield from (upright.replace(period=period) for period in PERIODS[1:])
     yield from (_quick(upright, period) for period in QUICK_PERIODS)
     inward = upright.replace(inward=INWARD)

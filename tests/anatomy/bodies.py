@@ -107,6 +107,7 @@ def biped(
     hand: float = 0.0,
     lean: float = 0.0,
     arm_mass: float = 0.5,
+    wide: float = 0.1,
 ) -> Body:
     """A body with legs, and arms unless they have no joints.
 
@@ -126,6 +127,7 @@ def biped(
         hand: edge of a cube at the end of every arm [m], none if 0.
         lean: how far the feet are ahead of the hips [m].
         arm_mass: of every link of an arm [kg].
+        wide: width of a sole [m].
     """
     body = Body()
     pelvis = body.link((0, 0, 0), 4.0, (0, 0, 0.1), box((0, 0, 0.08), (0.12, 0.16, 0.1)))
@@ -140,7 +142,7 @@ def biped(
         for side in (-1, 1):
             before = len(body.places)
             end = body.chain(leg, pelvis, side * HIP_Y, bends)
-            _foot(body, end, side, foot, tilt if side < 0 else 0.0, toe, ahead)
+            _foot(body, end, side, foot, tilt if side < 0 else 0.0, toe, ahead, wide)
             if x + lean:
                 _shift(body, before, x + lean)
     for side in (-1, 1) if arm else ():
@@ -159,7 +161,9 @@ def biped(
     return body
 
 
-def _foot(body: Body, end: int, side: int, kind: str, tilt: float, toe: bool, ahead: float) -> None:
+def _foot(
+    body: Body, end: int, side: int, kind: str, tilt: float, toe: bool, ahead: float, wide: float
+) -> None:
     x, y, _ = body.places[end]
     if kind == "none":
         return
@@ -168,12 +172,12 @@ def _foot(body: Body, end: int, side: int, kind: str, tilt: float, toe: bool, ah
     else:
         length = 0.14 if toe else 0.2
         middle = ahead - (0.03 if toe else 0.0)
-        plate = box((middle, side * 0.01, PLATE / 2), (length, 0.1, PLATE), f"{tilt} 0 0")
+        plate = box((middle, side * 0.01, PLATE / 2), (length, wide, PLATE), f"{tilt} 0 0")
         foot = body.link((x, y, SOLE), 0.4, (x, y, SOLE + 0.02), plate)
     body.joint(end, foot, "")
     if toe:
         at = (x + 0.06, y, SOLE + 0.015)
-        tip = body.link(at, 0.1, at, box((0.03, side * 0.01, -0.005), (0.06, 0.1, PLATE)))
+        tip = body.link(at, 0.1, at, box((0.03, side * 0.01, -0.005), (0.06, wide, PLATE)))
         body.joint(foot, tip, "pitch", (-0.5, 1.0))
 
 

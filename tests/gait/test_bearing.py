@@ -11,6 +11,7 @@ from screwkin.dynamics.support import sole_corners
 from screwkin.gait.bearing import bearing, leans_of, supports
 from screwkin.gait.follow import follow
 from screwkin.gait.lengths import fitted
+from screwkin.gait.paces import STEP_SIZES, usual_pace
 from screwkin.gait.stance import stance_of
 from screwkin.mechanism.choice import closed_mechanism
 from screwkin.model.urdf_in import parse_urdf
@@ -21,8 +22,8 @@ NEITHER = ("hip_roll", "hip_pitch", "knee_pitch", "ankle_pitch")
 QUICK = {"period": 2.0, "stand": 2.0, "stride": "0.2*leg", "lift": "0.04*leg", "lateral": "lean"}
 
 
-def walker(joints: tuple[str, ...]) -> sk.Robot:
-    return humanoid(parse_urdf(biped(leg=joints).text()).robot)
+def walker(joints: tuple[str, ...], wide: float = 0.1) -> sk.Robot:
+    return humanoid(parse_urdf(biped(leg=joints, wide=wide).text()).robot)
 
 
 @pytest.fixture(scope="module", params=[NO_ANKLE_ROLL, NEITHER], ids=["five", "four"])
@@ -109,3 +110,14 @@ def test_contact_forces_are_where_the_plan_has_them() -> None:
     alone = np.all([walk.contact[now + k].sum(axis=1) == 1 for k in range(-2, 3)], axis=0)
     assert alone.sum() > 500
     assert np.abs(check.zmp.contact - check.zmp.planned)[alone].max() < 5e-3  # of a sole 100 mm wide
+
+
+@pytest.mark.parametrize("wide", [0.1, 0.03])
+def test_the_pace_that_is_tried_first_holds_on_blades(wide: float) -> None:
+    """No ankle rights a sole that tips, so that its ZMP must be led where all links have it."""
+    robot = walker(NO_ANKLE_ROLL, wide)
+    size = STEP_SIZES[1]
+    gait = usual_pace(robot).replace(stride=f"{size.stride}*leg", lift=f"{size.lift}*leg")
+    walk = sk.walk(robot, gait, steps=4)
+    assert walk.margin.min() > 0.2 * wide
+    assert sk.validate(robot, walk, engine="mujoco", servo="rigid").passed

@@ -98,3 +98,12 @@ def test_every_other_pace_differs_from_the_usual_one_and_from_all_before(robot, 
     paces = [usual, *other_paces(robot, usual)]
     assert legs == "six joints" or min(pace.numbers["ahead"] for pace in paces) == LEAST_AHEAD < 1
     assert len({str(sorted(pace.to_dict().items())) for pace in paces}) == len(paces)
+
+
+def test_legs_without_ankle_roll_lean_at_every_pace_by_the_zmp_of_all_links():
+    """A waist that shifts would set their soles on edges."""
+    leg = ("hip_yaw", "hip_roll", "hip_pitch", "knee_pitch", "ankle_pitch")
+    robot = humanoid(parse_urdf(biped(leg=leg).text()).robot)
+    usual = usual_pace(robot)
+    for pace in (usual, *other_paces(robot, usual)):
+        assert (pace.lateral, pace.model) == ("lean", "links")
