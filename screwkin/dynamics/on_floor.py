@@ -73,9 +73,8 @@ def pressed_points(
 ) -> Array:
     """Where soles that lean press on the floor, beside where they do when flat: (T, feet, 3), tip axes [m].
 
-    The middle of the corners less that of the sole. A corner counts in full up to ``TOUCH`` above the lowest
-    one, and no more from twice that, so the point moves without a jump. Zero where a sole is flat; where it
-    turns about one of its edges it stays on this edge.
+    The middle of the corners that touch, up to ``TOUCH`` above the lowest one, less the middle of all. Zero
+    where a sole is flat; where it turns about one of its edges it is on this edge.
 
     Args:
         robot: with soles.
@@ -88,7 +87,7 @@ def pressed_points(
         corners, T = sole_corners(robot, foot), T_world_tip[foot]
         height = terrain.above_plane(np.einsum("tij,kj->tki", T[:, :3, :3], corners) + T[:, None, :3, 3])
         rise = height - height.min(axis=1, keepdims=True)
-        share = np.clip(2.0 - rise / TOUCH, 0.0, 1.0)
+        share = (rise <= TOUCH).astype(float)
         pressed, flat = ((s @ corners) / s.sum(axis=1, keepdims=True) for s in (share, np.ones_like(share)))
         points.append(pressed - flat)
     return np.stack(points, axis=1)

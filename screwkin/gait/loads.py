@@ -18,8 +18,8 @@ LEAST_WAY = 0.1
 def balance_points(robot: Robot, trajectory: Trajectory) -> Array:
     """Where feet press on the floor if the ZMP is on the line between them, (T, feet, 3) [m].
 
-    At their tips. A foot that turns about an edge of its sole presses there, and as long as both stand flat
-    before and after, the point goes to this edge and back evenly in time.
+    At their tips. A foot that turns about an edge of its sole presses there. While it stands flat before that
+    or after, beside the other one, the point goes to this edge or comes from it evenly in time.
 
     Args:
         robot: with soles.

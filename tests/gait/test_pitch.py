@@ -170,7 +170,7 @@ def test_feet_that_turn_carry_their_load_on_their_edge(walk: sk.Trajectory) -> N
         T = walk.T_world_tip[foot]
         own = np.einsum("tji,tj->ti", T[:, :3, :3], points[:, i] - T[:, :3, 3])
         middle = 0.5 * sum(EDGES[foot])
-        turned = walk.contact[:, i] & (np.abs(T[:, 2, 0]) * (EDGES[foot][1] - EDGES[foot][0]) > 2.5 * TOUCH)
+        turned = walk.contact[:, i] & (np.abs(T[:, 2, 0]) * (EDGES[foot][1] - EDGES[foot][0]) > 1.01 * TOUCH)
         edge = np.where(T[turned, 2, 0] < 0, EDGES[foot][1], EDGES[foot][0])
         assert own[turned, 0] == pytest.approx(edge - middle, abs=1e-9)
         assert away[turned, i, 0] == pytest.approx(edge - middle, abs=1e-9)
