@@ -48,7 +48,7 @@ class Memory:
 
     mode: starting, stepping or stopping; tau: time in it [s]; period: of the step in course [s]; side: of the
     foot that stands, +1 left; stance, other: feet on the floor, the other one where it stood at last (x, y
-    [m], yaw [rad]); com, rate, zmp: of the internal pendulum; held, place: see ``landing``; seen: side of
+    [m], yaw [rad]); com, rate, zmp: of the internal pendulum; held, place: see ``StepState``; seen: side of
     the foot by which the CoM was measured last, 0 if never; gap, gap_rate: of the CoM from the pendulum,
     measured, beside what lasts of it (lasting); error: of the DCM; slope, lean: of the floor and of the
     trunk beside it, about x and y [rad]; waist: x, y.

@@ -190,7 +190,7 @@ def nominal_place(rhythm: Rhythm, side: Scalar, step: Sequence[Scalar]) -> Pair:
 
 
 class StepState(Protocol):
-    """What the law asks of a walk in course; see ``stabiliser.Memory``."""
+    """What the law asks of a walk in course; see ``cycle.Memory``."""
 
     @property
     def tau(self) -> Scalar:

@@ -48,7 +48,7 @@ KINDS = ("preview", "footsteps")
 class Felt:
     """What a robot feels, as arrays: attitude (3, 3) of its base against the vertical, joints q (n,).
 
-    By foot, right and left: force (2,) [N], pressure (2, 2) in the tip's axes [m]; see ``stabiliser.Senses``.
+    By foot, right and left: force (2,) [N], pressure (2, 2) in the tip's axes [m]; see ``cycle.Sensed``.
     """
 
     attitude: Array
@@ -61,7 +61,7 @@ class Felt:
 class StabilisedState:
     """Where a stabilised walk is.
 
-    memory (k,): see ``stabiliser.Memory``; q (n,): commanded joint positions; landed: steps that have; time
+    memory (k,): see ``cycle.Memory``; q (n,): commanded joint positions; landed: steps that have; time
     since the start [s]; feet: where they stand by what was felt.
     """
 
