@@ -27,6 +27,7 @@ _BACK = 4  # values that are planned in full before a key is given up
 _LOWEST, _HIGHEST, _HEIGHTS = 0.5, 0.98, 17  # waist heights that are tried, of legs stretched down
 _TOGETHER = (0.93, 0.87, 0.8)  # those that are tried with smaller moves
 _SHARES = (0.75, 0.5, 0.25, 0.1)  # of stride, side, turn and lift together
+_ANGLES = (0.1, 0.2, 0.3)  # rad: by which feet might turn about their edges
 _NO_STEP = 10.0  # times the length of a leg: what no step is meant to be
 _TOO = {"stride": "long", "side": "wide", "turn": "far", "lift": "high", "sway": "wide", "spread": "wide"}
 
@@ -134,6 +135,10 @@ def _legs(trial: _Trial, limb: str) -> Iterator[str]:
         yield sentence
     if not found:
         yield from _together(trial, moves)
+    level = gait.kind != "geometric" and gait.toe == gait.heel == 0.0
+    pitched = [{"toe": angle, "heel": angle} for angle in _ANGLES]
+    if limb and level and (changes := trial.first(pitched)) is not None:
+        yield f"soles stay level: toe and heel {changes['toe']:g} work"
 
 
 def _height(trial: _Trial, limb: str) -> str:

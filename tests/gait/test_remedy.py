@@ -53,6 +53,18 @@ def test_a_waist_above_the_stretched_legs_is_told_by_their_reach():
     assert f"waist_height 0.21 is above what right_leg reaches, {reach:.3g}: " in message
 
 
+def test_legs_that_reach_no_further_on_level_soles_are_told_by_how_much_feet_may_pitch():
+    robot = sk.load_robot("bioloid")
+    gait = sk.load_gait("preview").replace(stride=0.165, waist_height=0.16)
+    with pytest.raises(NoSolutionError) as caught:
+        sk.walk(robot, gait, 4)
+    angle = re.search(r"; or soles stay level: toe and heel (\S+) work", str(caught.value))[1]
+    assert sk.walk(robot, gait.replace(toe=angle, heel=angle), 4).margin.min() > 0
+    with pytest.raises(NoSolutionError, match="out of reach") as caught:
+        sk.walk(robot, gait.replace(toe=angle, heel=angle, stride=0.25), 4)
+    assert "toe" not in str(caught.value)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", ["bioloid", "poppy12"])
 def test_every_refusal_of_random_gaits_names_a_key_that_was_changed(robot):
