@@ -9,6 +9,7 @@ import pytest
 
 import screwkin as sk
 from screwkin.anatomy.humanoid import humanoid
+from screwkin.errors import GaitError
 from screwkin.gait.driven import driven
 from screwkin.gait.paces import usual_pace
 from screwkin.model.robot import Robot
@@ -60,3 +61,14 @@ def test_legs_of_coupled_joints_walk_where_the_plan_has_them(names, ties):
     h = walked.time[1] - walked.time[0]
     slope = (walked.q[2:] - walked.q[:-2]) / (2 * h)
     assert np.quantile(np.abs(slope - walked.qd[1:-1]), 0.95) < 0.02
+
+
+def test_parallelograms_that_keep_soles_level_refuse_to_pitch_them_and_split_knees_do_it():
+    """By the names of the keys; only legs whose feet can turn do so."""
+    refusing, pitching = coupled_legs(*CASES[-1]), coupled_legs(*CASES[0])
+    changes = {"stride": "0.1*leg", "lift": "0.05*leg", "bend": 0.93, "rate": 40, "toe": 0.1, "heel": 0.1}
+    with pytest.raises(GaitError, match=r"key heel: .*no joint pitches") as caught:
+        sk.walk(refusing, usual_pace(refusing).replace(**changes), steps=2)
+    assert "key toe" in str(caught.value)
+    walked = sk.walk(pitching, usual_pace(pitching).replace(**changes), steps=3)
+    assert max(np.abs(walked.T_world_tip[foot][:, 2, 0]).max() for foot in walked.feet) > 0.02
