@@ -1,8 +1,8 @@
 """Which joints a gait drives: those with which legs follow poses and arms follow their hands.
 
-A joint that moves no limb, or more than one, rests at its ``home`` position, and so does the surplus of a
-limb with more joints than its target asks for. The others then follow from base and tips alone, at every
-sample, and their rates are the slopes of their positions.
+A joint that moves no leg or arm, or more than one, rests at its ``home`` position, and so does the surplus
+of a limb with more joints than its target asks for. The others then follow from base and tips alone, at
+every sample, and their rates are the slopes of their positions.
 """
 
 from __future__ import annotations
@@ -102,8 +102,8 @@ def driven(robot: Robot, at_rest: tuple[str, ...] = ()) -> Driven:
 
 
 def arms_of(robot: Robot) -> tuple[str, ...]:
-    """Names of the limbs that are no legs."""
-    return tuple(limb.name for limb in robot.limbs if limb.kind != "leg")
+    """Names of the limbs that are arms."""
+    return tuple(limb.name for limb in robot.limbs if limb.kind == "arm")
 
 
 Parts = tuple[Robot | None, tuple[int, ...], Array, tuple[str, ...], Mapping[str, Array]]
@@ -126,9 +126,9 @@ def _moving(robot: Robot, at_rest: tuple[str, ...]) -> Parts:
         for limb, other in zip(robot.limbs, standing.limbs, strict=True)
         if limb.frame is not other.frame
     }
-    chosen = {limb.name: _chosen(robot, limb, home) for limb in robot.limbs}
+    chosen = {limb.name: _chosen(robot, limb, home) for limb in robot.limbs if limb.kind != "other"}
     few = tuple(name for name, joints in chosen.items() if not joints)
-    resting = {*few, *at_rest}
+    resting = {*few, *at_rest, *(limb.name for limb in robot.limbs if limb.kind == "other")}
     moving = {i for name, joints in chosen.items() if name not in at_rest for i in joints}
     moving |= {i for linkage in linkages(robot) if moving & set(linkage.path) for i in linkage.joints}
     rest = {joint.name: float(home[i]) for i, joint in enumerate(robot.joints) if i not in moving}
@@ -141,7 +141,8 @@ def _moving(robot: Robot, at_rest: tuple[str, ...]) -> Parts:
 
 def _chosen(robot: Robot, limb: Limb, home: Array) -> tuple[int, ...]:
     """Indices of a limb's joints that move, from the base on; of coupled ones those that lead."""
-    others = {i for other in robot.limbs if other.name != limb.name for i in robot.leading(other.link)}
+    beside = [other for other in robot.limbs if other.name != limb.name and other.kind != "other"]
+    others = {i for other in beside for i in robot.leading(other.link)}
     others |= {i for one in linkages(robot) for i in one.path if i not in one.imposed}  # they follow
     own = [i for i in robot.leading(limb.link) if i not in others]
     if limb.kind == "leg":

@@ -95,7 +95,7 @@ def follow(
             near = dead_points(drive.moving, planned.time, solution.state.q)
             motion = differentiate(mechanism, planned, solution.state)
         except (UnreachableError, SingularError, LimitError) as error:
-            if error.limb not in [limb.name for limb in robot.limbs if limb.kind != "leg"]:
+            if error.limb not in arms_of(robot):
                 raise
             at_rest, notes = (*at_rest, error.limb), (*notes, _rests(robot, gait, error.limb, str(error)))
         else:

@@ -70,7 +70,7 @@ def lengths_of(robot: Robot) -> Mapping[str, float]:
     drops = [
         float((back @ limb_root(robot, limb.name)).z - (back @ pose_in_base(robot, D, limb.tip).p).z)
         for limb in robot.limbs
-        if limb.kind != "leg"
+        if limb.kind == "arm"
     ]
     soles = [np.ptp(np.array(foot.sole)[:, 0]) for foot in stance.feet]
     hip_height = float(sum(hip.z for hip in hips) / len(hips))

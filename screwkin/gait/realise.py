@@ -83,7 +83,7 @@ def targets_of(mechanism: Mechanism, planned: Plan) -> dict[str, Array]:
 
 def posed_hands(mechanism: Mechanism) -> tuple[str, ...]:
     """Tips of arms the rotations of whose chains are imposed, not monitored."""
-    tips = [limb.tip for limb in mechanism.robot.limbs if limb.kind != "leg"]
+    tips = [limb.tip for limb in mechanism.robot.limbs if limb.kind == "arm"]
     return tuple(tip for tip in tips if any(name.startswith(f"{tip}.r") for name in mechanism.primary))
 
 

@@ -20,7 +20,7 @@ from screwkin.algebra.se3 import Pose, Vector
 JointType = Literal["revolute", "prismatic", "helical"]
 ShapeKind = Literal["box", "cylinder", "sphere", "capsule", "mesh"]
 ShapeRole = Literal["visual", "collision"]
-LimbKind = Literal["leg", "arm"]
+LimbKind = Literal["leg", "arm", "other"]
 FLOOR = "floor"
 """Name of what the robot stands on, which a closure may name like a link: its frames are the world's."""
 LIMIT_TOLERANCE = 1e-9

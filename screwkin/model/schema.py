@@ -174,7 +174,7 @@ class LimbRow(Row):
     """[[limb]]: a leg or an arm, and its tip."""
 
     name: Name = Field(description="name of the limb")
-    kind: LimbKind = Field(description='"leg" or "arm"')
+    kind: LimbKind = Field(description='"leg", "arm", or "other", as a head or a tail, which rests in walks')
     link: Name = Field(description="name of its last link")
     tip: Name = Field(description="name of the frame at its end")
     frame: FrameRow = Field(description="{ xyz = [x, y, z], rpy = [roll, pitch, yaw] } of the tip")

@@ -20,6 +20,7 @@ from screwkin.model.records import (
     CoupledJoint,
     Inertia,
     Joint,
+    LimbKind,
     LinkSpring,
     RobotRecord,
     Shape,
@@ -70,7 +71,7 @@ def _names_certified(robot: RobotRecord) -> bool:
         and not {frame.name for frame in robot.frames} & {*named, *tips, *RESERVED}
         and all(frame.link in named for frame in robot.frames)
         and all(NAME.fullmatch(tip) for tip in tips)
-        and all(limb.link in named and limb.kind in ("leg", "arm") for limb in limbs)
+        and all(limb.link in named and limb.kind in get_args(LimbKind) for limb in limbs)
         and all(limb.chain and len({*limb.chain} & {*COUPLINGS}) == len(limb.chain) for limb in limbs)
         and soled <= legs
         and len(soled) == len(robot.soles)

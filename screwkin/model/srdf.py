@@ -96,7 +96,8 @@ def _limbs(reader: Reader, root: Element) -> Iterator[tuple[str, LimbKind, str, 
         kind, tip = element.get("kind", ""), element.get("tip", "")
         chain = tuple(element.get("chain", " ".join(COUPLINGS)).split())
         if kind not in get_args(LimbKind):
-            reader.fault(f"<limb> {name!r}", "kind", f"is {kind!r}", 'Write kind="leg" or kind="arm"')
+            fix = 'Write kind="leg", kind="arm" or kind="other"'
+            reader.fault(f"<limb> {name!r}", "kind", f"is {kind!r}", fix)
         else:
             yield name, kind, tip, chain
 

@@ -6,13 +6,14 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from screwkin.analysis.account import Account
 from screwkin.errors import needed_for
 from screwkin.files import atomic_path
+from screwkin.model.records import LimbKind
 
 Figure = Any
 Axes = Any
@@ -124,9 +125,9 @@ def foot_colours(account: Account) -> dict[str, str]:
 
 
 def limb_colours(account: Account) -> dict[str, str]:
-    """Colour of every limb: the k-th leg and the k-th arm share theirs."""
+    """Colour of every limb: the k-th leg, the k-th arm and the k-th other share theirs."""
     colours: dict[str, str] = {}
-    for kind in ("leg", "arm"):
+    for kind in get_args(LimbKind):
         names = [limb.name for limb in account.robot.limbs if limb.kind == kind]
         colours |= {name: SIDES[k % len(SIDES)] for k, name in enumerate(names)}
     return colours

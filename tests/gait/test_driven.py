@@ -14,9 +14,11 @@ from screwkin.algebra.se3 import UNTURNED, Pose, Vector
 from screwkin.errors import InputError, UnknownNameError
 from screwkin.gait.driven import driven
 from screwkin.gait.held import with_held_joints
-from screwkin.model.records import Frame
+from screwkin.model.records import Frame, Limb
 from screwkin.model.robot import Inertia, Link, Robot
 from screwkin.model.table import parse_robot
+from screwkin.model.toml_out import robot_toml
+from screwkin.model.values import COUPLINGS
 from tests.cases.tables import NECK, WAIST_JOINT
 from tests.laws.descriptions import mirrored
 
@@ -104,6 +106,27 @@ def test_an_arm_of_two_joints_rests_and_the_walk_says_so() -> None:
     arms = [i for i, name in enumerate(walked.joint_names) if "shoulder" in name]
     assert np.ptp(walked.q[:, arms], axis=0).max() == 0
     assert "right_arm rests: fewer than 3 joints" in walked.meta["notes"][-2]
+
+
+@pytest.mark.parametrize("name", ["bioloid", "poppy12"])
+def test_limbs_that_are_neither_legs_nor_arms_change_no_walk(name: str) -> None:
+    """A tip on every link of a leg, and one on the base's first neighbour: poses to ask for, and no more."""
+    robot, gait = sk.load_robot(name), sk.load_gait("auto")
+    more = tuple(
+        Limb(f"{link.name}_limb", "other", link.name, f"{link.name}_tip", link.frame, COUPLINGS)
+        for link in robot.links
+        if link.name != robot.base_link and robot.leading(link.name)
+    )
+    seen = sk.robot_from_text(robot_toml(replace(robot, limbs=(*robot.limbs, *more))), name=name)
+    assert {limb.kind for limb in seen.limbs} >= {"leg", "other"}
+    walked, plain = (
+        sk.walk(seen, gait.replace(rate=10), steps=1),
+        sk.walk(robot, gait.replace(rate=10), steps=1),
+    )
+    np.testing.assert_allclose(walked.q, plain.q, rtol=0, atol=1e-12)
+    at = sk.State(walked.T_world_base, walked.q)
+    for limb in more:
+        np.testing.assert_allclose(walked.T_world_tip[limb.tip], sk.frame_pose(seen, at, limb.tip), atol=1e-9)
 
 
 def test_what_cannot_be_held_is_refused() -> None:
