@@ -70,6 +70,8 @@ STANDING_SHARE = 0.3
 """Share of an ankle's torque with which it carries the robot on one foot."""
 EXACT = 1e-8
 """Weight of changes of the jerk where no ankle rights a sole that tips: the ZMP is to be where it should."""
+FINE = 8
+"""Samples, at least, in which the weight then goes from foot to foot, and soles turn level with it."""
 LEAST_AHEAD = 0.3
 """How far ahead of the ankles the ZMP goes at least, by the middle of the sole."""
 _LATERAL = 0.7
@@ -111,7 +113,7 @@ def usual_pace(robot: Robot) -> Gait:
     if ahead < 1:
         gait = gait.replace(ahead=ahead)
     if _without_ankle_roll(robot):
-        return _leaning(gait.replace(model="links", R=EXACT), LEANING[0])
+        return _level(gait.replace(model="links", R=EXACT), LEANING[0])
     return gait.replace(period=PERIODS[0])
 
 
@@ -123,10 +125,10 @@ def other_paces(robot: Robot, usual: Gait) -> Iterator[Gait]:
         usual: from ``usual_pace``.
     """
     if _without_ankle_roll(robot):
-        yield from (_leaning(usual, period) for period in LEANING[1:])
+        yield from (_level(usual, period) for period in LEANING[1:])
         if usual.numbers["ahead"] > LEAST_AHEAD:
-            yield from (_leaning(usual.replace(ahead=LEAST_AHEAD), period) for period in LEANING)
-        yield from (_leaning(usual.replace(inward=INWARD), period) for period in LEANING)
+            yield from (_level(usual.replace(ahead=LEAST_AHEAD), period) for period in LEANING)
+        yield from (_level(usual.replace(inward=INWARD), period) for period in LEANING)
         return
     upright = usual.replace(lateral="shift", stand=1, period=PERIODS[0])
     yield from (upright.replace(period=period) for period in PERIODS[1:])
@@ -153,6 +155,13 @@ def _quick(gait: Gait, period: float) -> Gait:
 
 def _leaning(gait: Gait, period: float) -> Gait:
     return _quick(gait.replace(lateral="lean"), period)
+
+
+def _level(gait: Gait, period: float) -> Gait:
+    """A waist that leans over level soles, with samples that show how these turn level."""
+    leaning = _leaning(gait, period)
+    shown = FINE / (leaning.numbers["dsp"] * leaning.Tc)
+    return leaning.replace(rate=float(np.ceil(max(leaning.rate, shown))))
 
 
 def _without_ankle_roll(robot: Robot) -> bool:

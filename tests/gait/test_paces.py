@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import screwkin as sk
 from screwkin.algebra.se3 import Vector
 from screwkin.anatomy.humanoid import humanoid
-from screwkin.gait.paces import LEAST_AHEAD, NEARER, SOLE_GAP, STANDING_SHARE, other_paces, usual_pace
+from screwkin.gait.paces import FINE, LEAST_AHEAD, NEARER, SOLE_GAP, STANDING_SHARE, other_paces, usual_pace
 from screwkin.gait.stance import stance_of
 from screwkin.kinematics.mass import GRAVITY
 from screwkin.model.urdf_in import parse_urdf
@@ -107,3 +107,4 @@ def test_legs_without_ankle_roll_lean_at_every_pace_by_the_zmp_of_all_links():
     usual = usual_pace(robot)
     for pace in (usual, *other_paces(robot, usual)):
         assert (pace.lateral, pace.model) == ("lean", "links")
+        assert pace.rate * pace.numbers["dsp"] * pace.Tc >= FINE
