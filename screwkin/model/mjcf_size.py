@@ -22,7 +22,6 @@ _COUNTS: Mapping[str, tuple[str, ...]] = {
     "composite": ("count",),
     "flexcomp": ("count",),
     "hfield": ("nrow", "ncol"),
-    "texture": ("width", "height"),
     "numeric": ("size",),
     "user": ("dim",),
     "contact": ("num",),

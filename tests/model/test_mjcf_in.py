@@ -189,3 +189,20 @@ def test_joints_that_do_not_free_a_body_stay(root):
     robot = floats(root, " ".join(["0"] * root.count("<joint")))
     assert robot.base == "fixed"
     assert len(robot.joints) == 3 + root.count("<joint")
+
+
+def test_pictures_of_textures_are_not_painted(tmp_path):
+    """A sky of 512 x 3072, as many scenes have it, and one of gigabytes, in the file and in one attached."""
+    sky = '<texture name="sky" type="skybox" builtin="gradient" width="512" height="3072"/>'
+    vast = '<texture name="vast" type="2d" builtin="flat" width="60000" height="60000"/>'
+    body = '<body name="arm"><joint name="j"/><geom size="0.1" mass="1"/></body>'
+    child = f'<mujoco model="c"><asset>{vast}</asset><worldbody>{body}</worldbody></mujoco>'
+    (tmp_path / "child.xml").write_text(child)
+    assets = sky + vast.replace("vast", "more") + '<model name="ch" file="child.xml"/>'
+    text = f"""<mujoco model="m"><asset>{assets}</asset>
+      <worldbody><body name="base"><freejoint/><geom size="0.1" mass="1"/>
+      <attach model="ch" body="arm" prefix="x"/></body></worldbody></mujoco>"""
+    (tmp_path / "whole.xml").write_text(text)
+    read = parse_mjcf(text, str(tmp_path / "whole.xml")).robot
+    assert read.joint_names == ("xj",)
+    assert read.mass == pytest.approx(2.0)
