@@ -315,12 +315,15 @@ def _add_bodies(mj: Any, spec: Any, robot: Robot, bodies: tuple[SimBody, ...], r
         made[body.link.name] = (element, body.to_frame)
 
 
+_ROOM = 1e-6
 _ROBOT_GEOM = {"contype": 0, "conaffinity": 1, "friction": [0.0, 0.0, 0.0], "mass": 0.0}
 
 
 def _add_joint(mj: Any, element: Any, body: SimBody, joint: Joint, rotor: float) -> None:
     kinds = {"revolute": mj.mjtJoint.mjJNT_HINGE, "prismatic": mj.mjtJoint.mjJNT_SLIDE}
     limits = np.clip([joint.lower, joint.upper], -UNLIMITED, UNLIMITED)
+    if limits[0] == limits[1]:  # a joint that rests by its limits; the engine wants room between them
+        limits += np.array([-_ROOM, _ROOM])
     element.add_joint(
         name=joint.name,
         type=kinds[joint.type],

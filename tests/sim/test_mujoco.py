@@ -199,6 +199,14 @@ def test_a_sole_that_no_box_has_touches_with_its_own_corners(robot: Robot) -> No
     assert (min(corners)[0], max(corners)[0]) == pytest.approx((min(x), max(x)), abs=1e-4)
 
 
+def test_a_joint_without_room_between_its_limits_rests_there(robot: Robot) -> None:
+    elbow, home = robot.joint_names.index("left_elbow"), sk.home(robot)
+    at = float(home.q[elbow])
+    joints = [replace(j, lower=at, upper=at) if i == elbow else j for i, j in enumerate(robot.joints)]
+    stiff = replace(robot, joints=tuple(joints), postures=(robot.posture("home"),))
+    assert stand(MuJoCoBackend(stiff), home, 100).q[elbow] == pytest.approx(at, abs=2e-4)
+
+
 def helical(joint: Joint) -> Joint:
     return replace(joint, type="helical", screw=replace(joint.screw, pitch=0.01))
 
