@@ -19,6 +19,7 @@ from screwkin.dynamics.support import sole_corners
 from screwkin.errors import InputError
 from screwkin.files import read_file
 from screwkin.gait.ground import ground_of
+from screwkin.gait.pitch import recorded_angles
 from screwkin.kinematics.limits import limited_joints
 from screwkin.kinematics.mass import GRAVITY
 from screwkin.model.state import State
@@ -96,8 +97,14 @@ def forces_of(account: Account, friction: float | None) -> ForceAccount:
 
     Raises:
         NoSolutionError: at a sample no forces within friction carry it, or no foot is on the floor.
+        InputError: its gait turns feet onto edges of their soles.
     """
     trajectory, motion = account.trajectory, account.motion
+    if turned := recorded_angles(trajectory):
+        raise InputError(
+            f"forces are shared among the corners of whole soles, and {turned} of this walk turn soles onto"
+            " their edges; validate it, which simulates them, or plan it without"
+        )
     forces = contact_forces(
         account.robot,
         State(motion.T_world_base, motion.q),

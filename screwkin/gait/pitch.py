@@ -25,11 +25,20 @@ from screwkin.gait.motion import Motion, along, carried_point, level_pose, level
 from screwkin.gait.record import Gait
 from screwkin.gait.splines import minimum_jerk
 from screwkin.gait.stance import Foot, Stance
+from screwkin.trajectory import Trajectory
 
 
 def pitches(gait: Gait) -> bool:
     """Whether its feet are not always level."""
     return gait.heel != 0.0 or gait.toe != 0.0
+
+
+def recorded_angles(trajectory: Trajectory) -> str:
+    """The keys by whose angles the gait of a trajectory pitches feet, for messages; empty without any."""
+    recorded = trajectory.meta.get("gait")
+    table = recorded.get("gait") if isinstance(recorded, Mapping) else None
+    keys = [key for key in ("toe", "heel") if isinstance(table, Mapping) and table.get(key, 0) != 0]
+    return " and ".join(keys)
 
 
 def refuse_level_legs(gait: Gait, feet: Sequence[str], free: dict[str, tuple[str, ...]]) -> None:

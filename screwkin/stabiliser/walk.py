@@ -16,6 +16,7 @@ from screwkin.compiler.records import identifier
 from screwkin.compiler.run import run
 from screwkin.errors import InputError
 from screwkin.gait.intended import intended
+from screwkin.gait.pitch import recorded_angles
 from screwkin.gait.stance import stance_of
 from screwkin.kinematics.body import center_of_mass, frame_pose
 from screwkin.model.robot import Robot
@@ -235,8 +236,8 @@ def _check_kind(trajectory: Trajectory) -> None:
     kind = table.get("kind") if isinstance(table, Mapping) else None
     if kind is not None and kind not in KINDS:
         raise InputError(f"a stabiliser walks plans of gaits of kind {' or '.join(KINDS)}, not {kind}")
-    if turned := [key for key in ("toe", "heel") if isinstance(table, Mapping) and table.get(key, 0) != 0]:
-        raise InputError(f"a stabiliser keeps soles level; plan the walk with {' = '.join(turned)} = 0")
+    if turned := recorded_angles(trajectory):
+        raise InputError(f"a stabiliser keeps soles level; plan the walk without {turned}")
 
 
 def stabiliser_of(robot: Robot) -> Program:

@@ -11,7 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import screwkin as sk
+from screwkin.analysis.account import account_of
 from screwkin.analysis.consistency import motion_faults
+from screwkin.analysis.contact_account import forces_of
 from screwkin.dynamics.on_floor import TOUCH, pressed_points, soles_on_floor
 from screwkin.dynamics.support import sole_corners
 from screwkin.errors import GaitError, InputError
@@ -212,10 +214,14 @@ def test_legs_that_keep_soles_level_refuse_by_the_keys_name() -> None:
 
 
 @pytest.mark.parametrize("key", ["toe", "heel"])
-def test_other_gaits_and_stabilisers_refuse_angles_by_their_name(key: str, walk: sk.Trajectory) -> None:
+def test_other_gaits_stabilisers_and_shares_of_forces_refuse_angles_by_their_name(
+    key: str, walk: sk.Trajectory
+) -> None:
     with pytest.raises(GaitError, match=key):
         sk.load_gait("walk").replace(**{key: 0.2})
     with pytest.raises(GaitError, match=key):
         PREVIEW.replace(**{key: -0.1})
     with pytest.raises(InputError, match=key):
         stabilised(ROBOT, walk)
+    with pytest.raises(InputError, match=key):
+        forces_of(account_of(ROBOT, walk), None)
