@@ -20,6 +20,9 @@ Faces = NDArray[np.int64]
 
 _SIGNS = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], dtype=float)
 _STEP = math.radians(15)  # between points of round faces: their chords are 0.9 % of a radius inside
+_FINE = math.radians(
+    3
+)  # of cylinders: the flats of feet that lie on their sides tilt them by less than noise
 _LEVEL = 1e-12  # a component of an axis that counts as none
 _NEAR = 0.05  # of a mesh's diagonal: what axes may miss it by
 
@@ -108,14 +111,14 @@ def _own_points(shape: Shape, upright: bool) -> Array:
         return 0.5 * _SIGNS * size
     radius, half = size[0], size[-1] / 2
     if shape.kind == "cylinder":
-        return np.concatenate([_ring(radius, end) for end in (-half, half)])
+        return np.concatenate([_ring(radius, end, _FINE) for end in (-half, half)])
     if shape.kind == "sphere":
         return _sphere(radius)
     return np.concatenate([_sphere(radius) + np.array([0, 0, end]) for end in (-half, half)])
 
 
-def _ring(radius: float, z: float) -> Array:
-    angles = np.arange(0, 2 * math.pi - _STEP / 2, _STEP)
+def _ring(radius: float, z: float, step: float = _STEP) -> Array:
+    angles = np.arange(0, 2 * math.pi - step / 2, step)
     return np.column_stack([radius * np.cos(angles), radius * np.sin(angles), np.full(len(angles), z)])
 
 

@@ -2,9 +2,16 @@
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
 
-from screwkin.anatomy.facets import area_of, hull_of
+from screwkin.algebra.se3 import pose_from_array
+from screwkin.anatomy.facets import area_of, facet_below, hull_of
+from screwkin.anatomy.footing import LEVEL
+from screwkin.model.records import Shape
+from screwkin.model.shapes import shape_points
 
 CIRCLE = np.linspace(0, 2 * np.pi, 300, endpoint=False)
 
@@ -41,3 +48,13 @@ def test_a_line_has_two_ends_and_a_grid_four_corners(angle):
 
 def test_one_point_is_its_own_hull():
     assert list(hull_of(np.zeros((1, 2)))) == [0]
+
+
+@given(st.floats(0.005, 0.1), st.floats(0.05, 0.3), st.floats(0, np.pi), st.floats(5e-4, 5e-3))
+def test_a_cylinder_on_its_side_stands_level_however_it_is_turned_about_itself(radius, length, turned, band):
+    """It touches the floor along a line; points stand for its round face, and their flats mean nothing."""
+    T = np.eye(4)
+    T[:3, :3] = (Rotation.from_euler("y", 90, degrees=True) * Rotation.from_euler("z", turned)).as_matrix()
+    points = shape_points(Shape("collision", "cylinder", pose_from_array(T), (radius, length)))
+    facet = facet_below(points, np.array([0.0, 0.0, 1.0]), band)
+    assert np.degrees(np.arccos(min(1.0, facet.up[2]))) < LEVEL
