@@ -16,7 +16,6 @@ from screwkin.kinematics.limits import limited_joints, limits_of
 from screwkin.model.robot import Robot
 from screwkin.sim.backend import Observation
 from screwkin.sim.perturbation import Perturbation
-from screwkin.stabiliser.lateness import LONGEST, Lateness, waiting
 from screwkin.stabiliser.rhythm import CYCLE
 from screwkin.stabiliser.walk import Felt, StabilisedWalk
 from screwkin.trajectory import Trajectory
@@ -54,7 +53,6 @@ class WalkController:
     """A stabilised walk as a controller; without feedback it walks the same, open loop.
 
     What commands of the plan allow for its servos is allowed for here too, at the phase in which the walk is.
-    With feedback, joints that follow sooner than others wait for them (``stabiliser.lateness``).
     No command is beyond a joint's limits, nor faster than its servo from the one before. deviation (n,): how
     far joint positions have come from the plan's at that phase, at most.
     """
@@ -83,9 +81,6 @@ class WalkController:
         self.course = self.walk.start
         self.deviation = np.zeros_like(self.course.q)
         self._last = np.clip(self.course.q + self._allowed[0], self._low, self._high)
-        self._late = Lateness.unknown(len(self.course.q))
-        self._course = np.tile(self.course.q, (round(LONGEST / self.period) + 2, 1))  # newest last
-        self._wanted = self._course[-3:]
         return self._last
 
     @property
@@ -97,14 +92,10 @@ class WalkController:
 
     def answer(self, felt: Felt) -> Array:
         """The next cycle's command."""
-        self._late = self._late.measured(self._wanted, felt.q, self.period)
         self.course = self.walk.advanced(self.course, felt, self.feedback)
         now = self.walk.phase(self.course)
         self.deviation = np.maximum(self.deviation, np.abs(self.course.q - self.walk.q[now]))
-        self._course = np.vstack([self._course[1:], self.course.q])
-        q = waiting(self._course, self._late.times, self.period) if self.feedback else self.course.q
-        self._wanted = np.vstack([self._wanted[1:], q])
-        goal = np.clip(q + self._allowed[now], self._low, self._high)
+        goal = np.clip(self.course.q + self._allowed[now], self._low, self._high)
         self._last = self._last + np.clip(goal - self._last, -self._farthest, self._farthest)
         return self._last
 
