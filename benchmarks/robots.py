@@ -1,11 +1,11 @@
 """python -m benchmarks.robots FILE|FOLDER... [--again] [--rows FILE] [--page FILE]: public robots, unedited.
 
-Every URDF is read, its limbs, soles and home are found, a gait is fitted to it, and six steps are walked and
-validated in both engines with rigid servos, as ``screwkin walk --auto`` and ``screwkin validate`` do. Each
-row is appended to ``benchmarks/results/robots.jsonl`` (or --rows) at once; files that stand there are tried
-again with --again alone, and the last row of a file counts. --unseen marks robots chosen after the rules of
-the search were frozen; what became of them at this first try is counted apart. --page writes the table of all
-rows as Markdown.
+Every URDF, and every MJCF file given by name, is read; limbs, soles, home and a gait that fits are found, and
+six steps are walked and validated in both engines with rigid servos, as ``screwkin walk --auto`` and
+``screwkin validate`` do. Each row is appended to ``benchmarks/results/robots.jsonl`` (or --rows) at once;
+files that stand there are tried again with --again alone, and the last row of a file counts. --unseen marks
+robots chosen after the rules of the search were frozen; what became of them at this first try is counted
+apart. --page writes the table of all rows as Markdown.
 """
 
 from __future__ import annotations
@@ -122,9 +122,10 @@ def page_of(rows: Sequence[Row]) -> str:
     lines = [
         "# Public robots, unedited",
         "",
-        "Written by `python -m benchmarks.robots FOLDER... --page docs/robots.md`: every URDF as its authors",
-        f"publish it; limbs, soles and home found, a gait fitted, {STEPS} steps, `validate` with defaults",
-        "on rigid servos. Anatomy: processor time of limbs, soles and home.",
+        "Written by `python -m benchmarks.robots FOLDER... --page docs/robots.md`: every URDF or MJCF file",
+        "as its authors publish it, xacro expanded; limbs, soles, home and a gait found, and walked for",
+        f"{STEPS} steps, `validate` with defaults on rigid servos. Anatomy: processor time of limbs, soles",
+        "and home.",
         "Solved: the share of a leg's own random poses within limits that inverse kinematics finds again.",
         "",
         f"{walked} of {len(rows)} files that were tried walk in both engines. Those with a star were chosen",
