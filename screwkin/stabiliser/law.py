@@ -37,6 +37,8 @@ LATE = 0.85
 """Share of a swing from which the landing place stays."""
 MOMENT = 3.0
 """Cycles before a landing from which its time stays."""
+SOONEST = 1.3
+"""Time of a swing, in time constants of the pendulum, to which slow steps of a robot that falls are cut."""
 SETTLED = 0.775
 """Time before a landing from which the wanted ZMP stays, in time constants of the pendulum."""
 
@@ -79,7 +81,8 @@ class Gains:
     slope and the CoM's gap [s]; trim: share of that gap which the waist takes back; sole: share of the sole,
     less margin, in which the ZMP may go; step: share of what is left that the foot's place takes, up to reach
     ahead and aside; timing: share of it that the step's time takes, within sooner to later of the planned
-    time, by at most two cycles a cycle; largest: error of the DCM beyond which it counts no more.
+    time, or as soon as ``SOONEST`` says, by at most two cycles a cycle; largest: error of the DCM beyond
+    which it counts no more.
     dead and margin are shares of half the sole's width, reach and largest of the CoM's height.
     """
 
@@ -312,7 +315,8 @@ def _timed(
     reach = where(now[0] > 0.0, spare[1], spare[0])
     fits = least(ratio(wanted[1], now[1], 1.0 / most), ratio(wanted[0] + reach, now[0], most))
     change = feedback * gains.timing / w * logarithm(fits)
-    timed = larger(clipped(course.period + change, gains.sooner * T, gains.later * T), tau + moment)
+    soonest = least(gains.sooner * T, rhythm.both + SOONEST / w)
+    timed = larger(clipped(course.period + change, soonest, gains.later * T), tau + moment)
     return where(free, timed, course.period)
 
 

@@ -146,18 +146,31 @@ def test_the_last_step_ends_at_rest(
     assert min(went) > -0.001  # never beyond the point of rest, to the side of the foot that landed
 
 
-def _landed(ahead: float, aside: float, side: float) -> float:
+def _landed(ahead: float, aside: float, side: float, rhythm: Rhythm = RHYTHM) -> float:
     """Duration of a step in which the DCM begins so far beside the foot that stands, inwards and ahead."""
-    period, tau, held, place, zmp = RHYTHM.period, RHYTHM.both, (0.0, 0.0), (0.05, -side * 0.084), (0.0, 0.0)
+    period, tau, held, place, zmp = rhythm.period, rhythm.both, (0.0, 0.0), (0.05, -side * 0.084), (0.0, 0.0)
     com, rate = (ahead, -side * aside), (0.0, 0.0)
     while tau < period - 1e-9:
-        dcm = com[0] + rate[0] / RHYTHM.w, com[1] + rate[1] / RHYTHM.w
+        dcm = com[0] + rate[0] / rhythm.w, com[1] + rate[1] / rhythm.w
         course = _Course(tau, period, side, held, place)
-        decided = law.step_landing(RHYTHM, Gains(), course, dcm, zmp, [(0.05, 0.0)] * 2, 1.0, 1.0)  # type: ignore[arg-type]
+        decided = law.step_landing(rhythm, Gains(), course, dcm, zmp, [(0.05, 0.0)] * 2, 1.0, 1.0)  # type: ignore[arg-type]
         period, held, place, zmp = decided.period, decided.held, decided.place, decided.zmp
-        com, rate = law.pendulum(com, rate, zmp, RHYTHM.w, CYCLE)
+        com, rate = law.pendulum(com, rate, zmp, rhythm.w, CYCLE)
         tau += CYCLE
     return period
+
+
+@given(period=st.floats(0.3, 2.0), aside=st.floats(0.08, 0.12), side=st.sampled_from([1.0, -1.0]))
+def test_a_slow_step_of_a_robot_that_falls_inwards_lands_as_soon_as_a_quick_one(
+    period: float, aside: float, side: float
+) -> None:
+    """Its swing is cut down to 1.3 time constants of the fall, by two cycles a cycle; quick ones to .7."""
+    period = CYCLE * round(period / CYCLE)
+    rhythm = replace(RHYTHM, period=period, double=CYCLE * round(0.2 * period / CYCLE) / period)
+    soonest = min(Gains().sooner * period, rhythm.both + 1.3 / rhythm.w)
+    followed = (period + 2.0 * rhythm.both) / 3.0 + 4 * CYCLE
+    took = _landed(0.0, aside, side, rhythm)
+    assert soonest - 1e-9 <= took <= max(soonest + CYCLE, followed)
 
 
 @given(ahead=st.floats(-0.1, 0.1), aside=st.floats(-0.03, 0.04), side=st.sampled_from([1.0, -1.0]))
