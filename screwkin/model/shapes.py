@@ -20,9 +20,7 @@ Faces = NDArray[np.int64]
 
 _SIGNS = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)], dtype=float)
 _STEP = math.radians(15)  # between points of round faces: their chords are 0.9 % of a radius inside
-_FINE = math.radians(
-    3
-)  # of cylinders: the flats of feet that lie on their sides tilt them by less than noise
+_FINE = math.radians(1)  # of cylinders: the flats of feet that lie on their sides tilt by less than noise
 _LEVEL = 1e-12  # a component of an axis that counts as none
 _NEAR = 0.05  # of a mesh's diagonal: what axes may miss it by
 

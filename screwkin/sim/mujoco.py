@@ -322,8 +322,7 @@ _ROBOT_GEOM = {"contype": 0, "conaffinity": 1, "friction": [0.0, 0.0, 0.0], "mas
 def _add_joint(mj: Any, element: Any, body: SimBody, joint: Joint, rotor: float) -> None:
     kinds = {"revolute": mj.mjtJoint.mjJNT_HINGE, "prismatic": mj.mjtJoint.mjJNT_SLIDE}
     limits = np.clip([joint.lower, joint.upper], -UNLIMITED, UNLIMITED)
-    if limits[0] == limits[1]:  # a joint that rests by its limits; the engine wants room between them
-        limits += np.array([-_ROOM, _ROOM])
+    limits += np.array([-_ROOM, _ROOM]) * (limits[0] == limits[1])  # the engine wants room between them
     element.add_joint(
         name=joint.name,
         type=kinds[joint.type],
