@@ -142,7 +142,7 @@ def test_points_of_links_hold_their_meshes_and_boxes_and_name_what_is_absent(pat
         assert np.abs(found.points["upper"] - corner).max(axis=1).min() < 1e-7
     (path.parent / "meshes" / "a.stl").unlink()
     missing = link_points(load_urdf(path).robot, "visual")
-    assert len(missing.points["upper"]) == 2 * 360  # two rings of points 3 deg apart
+    assert len(missing.points["upper"]) == 2 * 360  # two rings of points 1 deg apart
     (remark,) = missing.remarks
     assert "meshes/a.stl: cannot be read" in remark
     assert "(of upper)" in remark
