@@ -78,11 +78,22 @@ def load_distribution(trajectory: Trajectory, places: Array | None = None) -> Ar
 
 
 def _towards_first(trajectory: Trajectory, places: Array | None) -> Array:
-    """Place of the ZMP on the line from the second foot (0) to the first one (1), (T,)."""
+    """Place of the planned ZMP between the feet (T,), as ``way_to_first`` gives it."""
     if places is None:
         a, b = (trajectory.T_world_tip[foot][:, :2, 3] for foot in trajectory.feet)
     else:
         a, b = places[:, 0, :2], places[:, 1, :2]
+    return way_to_first(trajectory.zmp, a, b)
+
+
+def way_to_first(zmp: Array, a: Array, b: Array) -> Array:
+    """Place (T,) of the ZMP on the line from the second foot at b (0) to the first one at a (1).
+
+    Args:
+        zmp: (T, 2) [m].
+        a: the first foot (T, 2) [m].
+        b: the second foot (T, 2) [m].
+    """
     line = a - b
     length = np.maximum((line**2).sum(axis=1), 1e-12)
-    return np.clip(((trajectory.zmp - b) * line).sum(axis=1) / length, 0.0, 1.0)
+    return np.asarray(np.clip(((zmp - b) * line).sum(axis=1) / length, 0.0, 1.0))

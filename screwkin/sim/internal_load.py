@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from screwkin.algebra.arrays import Array, Booleans, stretches
+from screwkin.gait.loads import way_to_first
 from screwkin.kinematics.body import frame_pose, jacobian
 from screwkin.model.robot import Robot
 from screwkin.model.state import State
@@ -50,7 +51,8 @@ def without_internal_load(robot: Robot, state: State, torque: Array, wrenches: A
     """
     legs, whole = legs_of(robot), wrenches.sum(axis=1)
     places = [frame_pose(robot, state, leg)[:, :3, 3] for leg in legs]
-    first = _way_to_first(whole, *places)
+    zmp = np.stack([-whole[:, 1], whole[:, 0]], axis=1) / whole[:, 5:]
+    first = way_to_first(zmp, *(place[:, :2] for place in places))
     result = torque
     for leg, place, other, share, wrench in zip(
         legs, places, places[::-1], (first, 1.0 - first), np.moveaxis(wrenches, 1, 0), strict=True
@@ -74,11 +76,3 @@ def feet_held(robot: Robot, trajectory: Trajectory) -> Booleans:
         moved, turned = np.abs(change[:, :3, 3]).max(), np.abs(change[:, :3, :3]).max()
         held[start:end] = moved <= STILL[0] and turned <= STILL[1]
     return held
-
-
-def _way_to_first(wrench: Array, a: Array, b: Array) -> Array:
-    """Place of the ZMP on the line from the second foot at b (0) to the first one at a (1), (M,)."""
-    zmp = np.stack([-wrench[:, 1], wrench[:, 0]], axis=1) / wrench[:, 5:]
-    line = (a - b)[:, :2]
-    length = np.maximum((line**2).sum(axis=1), 1e-12)
-    return np.asarray(np.clip(((zmp - b[:, :2]) * line).sum(axis=1) / length, 0.0, 1.0))

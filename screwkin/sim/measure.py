@@ -102,7 +102,7 @@ def slip(run: Run, trajectory: Trajectory, robot: Robot) -> Slip:
     without one where the plan has them there at both samples around. As a foot turns about an edge its tip
     moves; what counts is the motion of the sole where the plan has it press on the floor.
     """
-    legs = tuple(limb.tip for limb in robot.limbs if limb.kind == "leg")
+    legs = legs_of(robot)
     played = _before_fall(run) & (run.time >= trajectory.time[0]) & (run.time <= trajectory.time[-1])
     if run.contact is None:
         after = np.minimum(np.searchsorted(trajectory.time, run.time[played]), trajectory.samples - 1)
